@@ -65,9 +65,14 @@ class Tool:
             cls.poll_message_set(reason)
         return not reason
 
-    def done(self, text: str) -> set[str]:
-        """Report what was done; the operator's result."""
-        self.report({'INFO'}, readable(text))
+    @property
+    def path(self) -> Path:
+        """The file that the artist has chosen, of operators with a file browser."""
+        return Path(bpy.path.abspath(self.filepath))
+
+    def done(self, text: str, warns: object = False) -> set[str]:
+        """Report what was done, perhaps as a warning; the operator's result."""
+        self.report({'WARNING' if warns else 'INFO'}, readable(text))
         return {'FINISHED'}
 
     def refused(self, text: str) -> set[str]:
@@ -106,11 +111,6 @@ class FileTool(Reporting):
 
     filename_ext = ENDING
     filter_glob: StringProperty(default="*.json", options={'HIDDEN'})
-
-    @property
-    def path(self) -> Path:
-        """The chosen file."""
-        return Path(bpy.path.abspath(self.filepath))
 
 
 def need(test: Callable[[bpy.types.Context], object], message: str) -> Need:
@@ -285,8 +285,3 @@ class FileJob(ModalJob):
         except RuntimeError as error:  # what that call reported, which must not end as a traceback
             return self.failed(str(error).strip().removeprefix("Error: "))
         return {'CANCELLED'}
-
-    @property
-    def path(self) -> Path:
-        """The chosen file."""
-        return Path(bpy.path.abspath(self.filepath))

@@ -112,7 +112,18 @@ class GroundTool(Tool):
 
     def handle(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
         """Do what an event asks for; the result of ``modal``."""
-        raise NotImplementedError
+        if event.type in {'ESC', 'RIGHTMOUSE', 'RET', 'NUMPAD_ENTER'}:
+            if event.value != 'PRESS':
+                return {'RUNNING_MODAL'}
+            self.end(context)
+            # What was done is done by undo steps of its own; without any, nothing happened.
+            return {'FINISHED'} if self._changed else {'CANCELLED'}
+        over = self.point(context, event)
+        handled = over and event.value == 'PRESS' and self.key(context, event)
+        self.show(context, event)
+        # Panels, headers and other editors stay usable.
+        passes = not over or event.type in NAVIGATION or event.type == 'TIMER'
+        return {'PASS_THROUGH'} if passes and not handled else {'RUNNING_MODAL'}
 
     def cancel(self, context: bpy.types.Context) -> None:
         """Blender ends the tool."""
@@ -212,18 +223,6 @@ class TETFLORA_OT_place_plant(GroundTool, bpy.types.Operator):
             return {'CANCELLED'}
         self._chosen, self._turn, self._scale, self._height = chosen, 0.0, 1.0, display_height(chosen)
         return self.go_on(context, event)
-
-    def handle(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
-        if event.type in {'ESC', 'RIGHTMOUSE', 'RET', 'NUMPAD_ENTER'}:
-            if event.value != 'PRESS':
-                return {'RUNNING_MODAL'}
-            self.end(context)
-            return {'FINISHED'} if self._changed else {'CANCELLED'}
-        over = self.point(context, event)
-        handled = over and event.value == 'PRESS' and self.key(context, event)
-        self.show(context, event)
-        passes = not over or event.type in NAVIGATION or event.type == 'TIMER'
-        return {'PASS_THROUGH'} if passes and not handled else {'RUNNING_MODAL'}
 
     def key(self, context: bpy.types.Context, event: bpy.types.Event) -> bool:
         wheel = {'WHEELUPMOUSE': 1, 'WHEELDOWNMOUSE': -1}.get(event.type, 0)
@@ -331,7 +330,9 @@ class TETFLORA_OT_paint_plants(GroundTool, bpy.types.Operator):
 
     def handle(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
         try:
-            return self._handle(context, event)
+            if self._resizing is not None:
+                return self._resize(context, event)
+            return super().handle(context, event) if self._stroke is None else self._go_on_stroke(context, event)
         except GoneError:
             raise
         except TetFloraError as error:
@@ -345,32 +346,14 @@ class TETFLORA_OT_paint_plants(GroundTool, bpy.types.Operator):
         self._stroke = None
         super().end(context)
 
-    def _handle(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
-        if self._resizing is not None:
-            return self._resize(context, event)
-        if self._stroke is None and event.type in {'ESC', 'RIGHTMOUSE', 'RET', 'NUMPAD_ENTER'}:
-            if event.value != 'PRESS':
-                return {'RUNNING_MODAL'}
-            self.end(context)
-            # What was done is done by undo steps of its own; without any, nothing happened.
-            return {'FINISHED'} if self._changed else {'CANCELLED'}
-        over = self.point(context, event)
-        if self._stroke is not None:
-            if (event.type == 'LEFTMOUSE' and event.value == 'RELEASE') or event.type == 'ESC':
-                self._end_stroke(context)
-            elif event.type == 'MOUSEMOVE' and self._hit is not None:
-                self._drag(context, event)
-            self.show(context, event)
-            return {'RUNNING_MODAL'}
-        if not over:
-            # Panels, headers and other editors stay usable.
-            self.show(context, event)
-            return {'PASS_THROUGH'}
-        if event.value == 'PRESS' and self.key(context, event):
-            self.show(context, event)
-            return {'RUNNING_MODAL'}
+    def _go_on_stroke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+        self.point(context, event)
+        if (event.type == 'LEFTMOUSE' and event.value == 'RELEASE') or event.type == 'ESC':
+            self._end_stroke(context)
+        elif event.type == 'MOUSEMOVE' and self._hit is not None:
+            self._drag(context, event)
         self.show(context, event)
-        return {'PASS_THROUGH'} if event.type in NAVIGATION or event.type == 'TIMER' else {'RUNNING_MODAL'}
+        return {'RUNNING_MODAL'}
 
     def key(self, context: bpy.types.Context, event: bpy.types.Event) -> bool:
         """Act on a key or button; whether it was for the brush."""

@@ -18,7 +18,7 @@ from ..tetflora_addon.blender.biomes.adding import (
     plant_biome_steps,
     remove_biome,
 )
-from ..tetflora_addon.blender.biomes.files import active_biome, find_biome, import_biome, read_biome, saved_populations
+from ..tetflora_addon.blender.biomes.files import active_biome, import_biome, read_biome, saved_populations
 from ..tetflora_addon.blender.biomes.files import save_biome as save_biome_file
 from ..tetflora_addon.blender.biomes.layers import (
     active_layer,
@@ -88,8 +88,7 @@ def tell_placed(operator: Reporting, made: PlacedPlants) -> set[str]:
         where = f' in the field "{made.objects[0].name}"'
     placed = f"{counted(made.number, 'plant')} of {made.wanted:,} placed{where}: {made.reason}"
     if made.reason:
-        operator.report({'WARNING'}, placed)
-        return {'FINISHED'}
+        return operator.done(placed, warns=True)
     returned = f"; {counted(made.returned, 'deleted plant')} restored" if made.returned else ""
     erased = f"; {made.erased:,} omitted where you erased" if made.erased else ""
     return operator.done(f"{counted(made.number, 'plant')} placed{where}{returned}{erased}")
@@ -104,8 +103,7 @@ def tell_layers(
         text += f'; "{kept[0]}" keeps its own material'
     if bare:
         others = f"; and {counted(len(bare) - 1, 'other layer')}" if len(bare) > 1 else ""
-        operator.report({'WARNING'}, f"{text}; without plants: {bare[0]}{others}")
-        return {'FINISHED'}
+        return operator.done(f"{text}; without plants: {bare[0]}{others}", warns=True)
     return operator.done(text + more)
 
 
@@ -181,7 +179,7 @@ class TETFLORA_OT_update_layers(ModalJob, bpy.types.Operator):
                     raise
                 bare.append(f"{name}: {error}")
         kept = []
-        for biome in filter(None, (find_biome(scene, uid) for uid in biomes)):
+        for biome in filter(None, (with_identity(scene.tetflora.layers, uid) for uid in biomes)):
             depsgraph.update()
             kept += lay_biome_soil(depsgraph, [e.object for e in biome.grounds if e.object is not None])
         return made, bare, kept

@@ -20,13 +20,7 @@ from ..tetflora_addon.blender.placing.plant_objects import (
 from ..tetflora_addon.blender.placing.populations import adopt, collection_of, owner_of
 from ..tetflora_addon.blender.placing.properties import MOST_EMPTIES
 from ..tetflora_addon.blender.scene.fields import FIELD_TYPES, fields_of
-from ..tetflora_addon.blender.scene.objects import (
-    SURFACE_TYPES,
-    is_scatter,
-    mark_scatter,
-    may_instance,
-    may_scatter,
-)
+from ..tetflora_addon.blender.scene.objects import SURFACE_TYPES, is_scatter, mark_scatter, may_instance, may_scatter
 from ..tetflora_addon.blender.species.asset_species import Datablock, asset_of
 from ..tetflora_addon.blender.species.catalog import default_species
 from ..tetflora_addon.blender.species.edits import catalog
@@ -58,10 +52,7 @@ class _Mark:
 _MARKS = {
     'OCCLUDER': _Mark("is_occluder", lambda obj: obj.type == 'MESH', "Select meshes first", "{} marked as occluder"),
     'EXPLICIT': _Mark(
-        "is_explicit",
-        can_be_explicit,
-        "Select meshes, or objects that instance them, first",
-        "{} will be refined",
+        "is_explicit", can_be_explicit, "Select meshes, or objects that instance them, first", "{} will be refined"
     ),
 }
 

@@ -12,18 +12,13 @@ from bpy_extras.io_utils import ImportHelper
 from ..tetflora_addon.blender.declare import once
 from ..tetflora_addon.blender.export.usd import ENDINGS as USD_ENDINGS
 from ..tetflora_addon.blender.export.usd import forest_steps
-from ..tetflora_addon.blender.geodata.columns import (
-    TetFloraInventoryColumn,
-    chosen_columns,
-    columns_in,
-    show_columns,
-)
+from ..tetflora_addon.blender.geodata.columns import TetFloraInventoryColumn, chosen_columns, columns_in, show_columns
 from ..tetflora_addon.blender.geodata.origin import EXISTING, MIDDLE, WHOLE, Import, Imported, Steps
 from ..tetflora_addon.blender.geodata.outlines import outline_steps
 from ..tetflora_addon.blender.geodata.terrain import PATTERN, terrain_steps
 from ..tetflora_addon.blender.geodata.trees import GENERIC, LEFT_OUT, canopy_steps, inventory_steps
 from ..tetflora_addon.blender.species.catalog import NO_SPECIES, operator_items
-from ..tetflora_addon.errors import TetFloraError, readable
+from ..tetflora_addon.errors import TetFloraError
 from ..tetflora_addon.geodata.inventories import IMPERIAL, METRIC
 from ..tetflora_addon.geodata.layers import ENDINGS
 from ..tetflora_addon.geodata.outlines import KINDS
@@ -92,8 +87,7 @@ class _Importing(FileJob, ImportHelper):
     def finish(self, context: bpy.types.Context, result: Imported) -> set[str]:
         if result.object is not None:
             select_only(context, [result.object])
-        self.report({'WARNING' if result.warning else 'INFO'}, readable("; ".join(result.told)))
-        return {'FINISHED'}
+        return self.done("; ".join(result.told), result.warning)
 
 
 class _Raster(_Importing):

@@ -165,5 +165,5 @@ class TETFLORA_OT_drop_to_ground(ModalJob, bpy.types.Operator):
         if left:
             notes.append(f'"{left[0]}" was not moved: it has modifiers, or was not created by TetFlora')
         moves = f"{counted(result.moved, 'plant')} moved to the ground"
-        self.report({'WARNING' if notes else 'INFO'}, "; ".join([moves, *notes]))
-        return {'FINISHED'} if result.moved else {'CANCELLED'}
+        done = self.done("; ".join([moves, *notes]), warns=notes)
+        return done if result.moved else {'CANCELLED'}

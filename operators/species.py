@@ -15,12 +15,7 @@ from ..tetflora_addon.blender.biomes import library
 from ..tetflora_addon.blender.declare import choice, once, string
 from ..tetflora_addon.blender.placing.assets import add_to_preferences, write_asset_library
 from ..tetflora_addon.blender.placing.plant_objects import assign_species
-from ..tetflora_addon.blender.species.catalog import (
-    OWN_FILES,
-    load_species_file,
-    save_species,
-    write_species,
-)
+from ..tetflora_addon.blender.species.catalog import OWN_FILES, load_species_file, save_species, write_species
 from ..tetflora_addon.blender.species.editor import orders_of, present_species
 from ..tetflora_addon.blender.species.edits import (
     catalog,
@@ -215,8 +210,7 @@ class TETFLORA_OT_delete_file(Reporting, bpy.types.Operator):
     biome: once.boolean("Biome", "A biome instead of a species")
     identifier: once.string("File", "Name of the file without its ending; the shown species or chosen biome if empty")
     cache: once.boolean(
-        "Cache",
-        "Delete all cached species analysis, and nothing else in the folder. It is computed again when needed",
+        "Cache", "Delete all cached species analysis, and nothing else in the folder. It is computed again when needed"
     )
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:

@@ -44,10 +44,7 @@ def split_layout(panel: bpy.types.Panel) -> bpy.types.UILayout:
 
 
 def section(
-    layout: bpy.types.UILayout,
-    title: str,
-    closed: bool = True,
-    switch: tuple[bpy.types.bpy_struct, str] | None = None,
+    layout: bpy.types.UILayout, title: str, closed: bool = True, switch: tuple[bpy.types.bpy_struct, str] | None = None
 ) -> bpy.types.UILayout | None:
     """Begin a section of a panel, with the property that turns it on in its header; None while it is closed."""
     header, body = layout.panel(title, default_closed=closed)

@@ -179,6 +179,11 @@ def spread(counts: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int
     return owner, np.arange(len(owner)) - first[owner]
 
 
+def batches(counts: NDArray[np.int64], most: int) -> list[NDArray[np.int64]]:
+    """Indices of things with ``counts`` others each, so many at a time that these are about ``most``."""
+    return np.split(np.arange(len(counts)), np.flatnonzero(np.diff(np.cumsum(counts) // most)) + 1)
+
+
 def connected(n: int, a: Integers, b: Integers) -> NDArray[np.int32]:
     """(n,) smallest index in the part of each of n things, of which a (e,) and b (e,) are connected."""
     label = np.arange(n, dtype=np.int32)

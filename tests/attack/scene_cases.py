@@ -60,7 +60,7 @@ def populations(rng: random.Random, _jail: Jail) -> None:
         population_data.check_population("layer 1", data)
     except ValueError as error:
         raise TetFloraError(str(error)) from None
-    population_data.fill_population(population, data, bpy.context.scene, [])
+    population_data.fill_population(population, data, bpy.context.scene)
     json.dumps(population_data.population_data(population))
 
 

@@ -17,7 +17,7 @@ AT_THE_ROOT = {"__init__.py", "blender_manifest.toml", "LICENSE"}
 FOLDERS = {"tetflora_addon", "operators", "panels"}
 # The manual, which the buttons for help open.
 HELP = {"docs/manual.md", *(f"docs/manual/{path.name}" for path in (build.ROOT / "docs" / "manual").glob("*.md"))}
-KINDS = {".py", ".json", ".svg", ".png", ".jpg", ".dat"}
+KINDS = {".py", ".json", ".svg", ".png", ".jpg", ".dat", ".vert", ".frag"}
 LARGEST = 2_200_000  # species have pictures of four seasons, biomes one each
 
 

@@ -219,12 +219,7 @@ class TetFloraScene(RefinementProperties, AnimationProperties, library.BiomeChoi
             ('REFINE', "Always Refine", "Refine instances whatever they cost"),
         ),
     )
-    expand_everything: boolean(
-        "Expand Everything",
-        "Create every polygon of every plant, for comparison. Eighty trees have about 4 million polygons; a forest "
-        "does not fit into memory",
-        options={'HIDDEN', 'ANIMATABLE'},
-    )
+    expand_everything: boolean("Expand Everything", settings.EVERYTHING, options={'HIDDEN', 'ANIMATABLE'})
 
     populate: pointer_to(properties.TetFloraLayer)
     layers: list_of(

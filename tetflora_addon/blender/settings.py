@@ -217,6 +217,11 @@ _WIND = properties_of(Wind)
 _SEASON = properties_of(Season)
 
 
+#: What *Expand Everything* does.
+EVERYTHING = (
+    "Create every polygon of every plant, for comparison. Eighty trees have about 4 million polygons; a forest does "
+    "not fit into memory"
+)
 _SHELL = {"min": 0.0, "max": 1.0, "options": {'HIDDEN', 'ANIMATABLE'}}
 
 
@@ -246,12 +251,7 @@ class RefinementProperties(settings_in(RefinementSettings)):
         (
             *QUALITY_ITEMS,
             ('CUSTOM', "Custom", "Your own values"),
-            (
-                'EVERYTHING',
-                "Every Polygon",
-                "Create every polygon of every plant, for comparison. Eighty trees have about 4 million polygons; a "
-                "forest does not fit into memory",
-            ),
+            ('EVERYTHING', "Every Polygon", EVERYTHING),
         ),
         get=quality_number,
         set=set_quality,
@@ -301,10 +301,16 @@ def wind_of(scene: bpy.types.Scene) -> Wind | None:
 
     With motion blur it is that of the middle of the exposure, from which Cycles goes back and forth by velocities. It
     does not depend on the scene's range of frames, which workers of a farm set to the frames that they render.
+
+    Raises
+    ------
+    SceneError
+        A setting is beyond its limits.
     """
     group = scene.tetflora.wind
     if not group.enabled or group.speed == 0.0:
         return None
+    check_limits(group, f'Scene "{scene.name}"')
     rate = scene.render.fps / scene.render.fps_base
     frame = scene.frame_current_final
     if group.loop:
@@ -361,10 +367,11 @@ class TetFloraYear(bpy.types.PropertyGroup):
 
 
 def season_of(scene: bpy.types.Scene) -> Season | None:
-    """The season at the scene's frame, its day within one year; None without seasons."""
+    """The season at the scene's frame, its day within one year; None without seasons. Errors are those of `wind_of`."""
     group = scene.tetflora.year
     if not group.enabled:
         return None
+    check_limits(group, f'Scene "{scene.name}"')
     return Season(group.day % DAYS, group.latitude, group.spread, group.snow)
 
 

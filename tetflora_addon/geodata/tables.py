@@ -214,7 +214,7 @@ _NUMBER, _UNIT = r"\d+(?:[.,’' ]\d{3})*(?:[.,]\d+)?(?:e[+-]?\d+)?|[.,]\d+", "|
 _SHAPE = re.compile(
     rf"(?:{_CELLS['class']})?\s*(?:{_CELLS['about']})?\s*(?:(?P<less>{_CELLS['less']})|(?P<more>{_CELLS['more']}))?\s*"
     rf"(?P<low>-?(?:{_NUMBER}))(?P<over>\+)?\s*(?P<first>{_UNIT})?\.?\s*(?:(?P<sep>{_CELLS['to']})\s*(?:<=?\s*)?"
-    rf"(?P<high>{_NUMBER})\s*(?P<second>{_UNIT})?\.?\s*)?(?P<plus>{_CELLS['plus']})?",
+    rf"(?P<high>{_NUMBER})\s*(?P<second>{_UNIT})?\.?\s*)?(?P<plus>{_CELLS['plus']})?"
 )
 _FLOAT = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)(?:e[-+]?\d+)?", re.IGNORECASE)
 #: Characters of a cell that count.

@@ -20,16 +20,7 @@ from ..parameters import keys_of
 from ..species.growing import EVEN
 from ..species.members import expected_forks, least_length, part_segments
 from ..species.skeletons import DrawnBranches, drawn_branches
-from ..species.species import (
-    LEAF_ENVELOPES,
-    LEAF_INCLINATIONS,
-    Dead,
-    Order,
-    Range,
-    Species,
-    fork_cuts,
-    whole_cuts,
-)
+from ..species.species import LEAF_ENVELOPES, LEAF_INCLINATIONS, Dead, Order, Range, Species, fork_cuts, whole_cuts
 from .grown_rows import NOW, UNTIL, grow_children, lengths, spread_children
 from .hashing import signed
 

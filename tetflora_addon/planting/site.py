@@ -48,8 +48,7 @@ class Limits(GroundLimits):
         """Whether all ground is within them."""
         level = self.slope_min <= 0.0 and self.slope_max >= pi / 2 - 1e-6
         high = (self.altitude_min, self.altitude_max) == (-inf, inf)
-        wet = self.wetness_min <= 0.0 and self.wetness_max >= 1.0
-        return level and high and wet and self.path_min <= 0.0 and self.path_max == inf
+        return level and high and not self.ask_for_water and self.path_min <= 0.0 and self.path_max == inf
 
 
 @dataclass(frozen=True)
@@ -73,11 +72,6 @@ class Zone:
     lines: Lines | None = None  # what distances are measured from: see `distance_lines`
     inverse: bool = False  # all but the zone, as what gives way to it has
 
-    @property
-    def asks_for_water(self) -> bool:
-        """Whether the wetness of the ground matters."""
-        return self.limits.wetness_min > 0.0 or self.limits.wetness_max < 1.0
-
     def share(self, spots: Spots, wet: WetGround | None) -> Floats:
         """How much of each place is the zone's, (n,) from 0 to 1."""
         one = self.limits
@@ -94,7 +88,7 @@ class Zone:
         if self.lines is not None:
             away = self.lines.nearness(spots.position[:, :2]) * _reach(one)
             share *= soft_between(away, one.path_min, one.path_max, one.path_softness, 0.0, inf)
-        if wet is not None and self.asks_for_water:
+        if wet is not None and one.ask_for_water:
             share *= by_wetness(wet.at(spots.position), one)
         return 1.0 - share if self.inverse else share
 
@@ -230,8 +224,7 @@ class Site:
                 self.border = Lines(border[:, 0], border[:, 1], np.full(len(border), float(rules.edge_falloff)))
         self.paths = lines_of_paths(ground.paths)
         self.chosen = chosen
-        self.by_wetness = rules.wetness_min > 0.0 or rules.wetness_max < 1.0
-        wet = self.by_wetness or any(zone.asks_for_water for zone in zones)
+        wet = any(limits.ask_for_water for limits in (rules, *(zone.limits for zone in zones)))
         self.wet = wet_ground(ground.triangles) if wet else None
 
     @property
@@ -284,7 +277,7 @@ class Site:
         limits = rules.altitude_min, rules.altitude_max
         if np.isfinite(limits).any():
             yield "altitude", lambda i: _between(points[i, 2], *limits, rules.altitude_falloff)
-        if self.by_wetness:
+        if rules.ask_for_water:
             yield "wetness", lambda i: by_wetness(self.wet.at(points[i]), rules)
         if self.zones:
             yield "zone", lambda i: self._zone_share(index[i], barycentric[i], points[i])

@@ -16,7 +16,7 @@ from hashlib import blake2b
 
 import numpy as np
 
-from ..arrays import Floats, Integers, Mask, spread
+from ..arrays import Floats, Integers, Mask, batches, spread
 from ..errors import SceneError
 
 #: Most cells of a grid, whatever its use.
@@ -102,13 +102,10 @@ def height_grid(triangles: Floats, cell: float) -> HeightGrid:
     lowest = np.clip(np.ceil(corners[..., 1].min(axis=1) - _HAIR), 0, rows - 1).astype(np.int64)
     highest = np.clip(np.floor(corners[..., 1].max(axis=1) + _HAIR), -1, rows - 1).astype(np.int64)
     number = np.maximum(highest - lowest + 1, 0)
-    at = 0
-    ends = np.cumsum(number)
-    while at < len(corners):  # some thousand rows of triangles together
-        stop = max(at + 1, int(np.searchsorted(ends, (ends[at - 1] if at else 0) + _ENTRIES)))
-        own, offset = spread(number[at:stop])
-        _draw(corners, slope, own + at, lowest[own + at] + offset, columns, top)
-        at = stop
+    for some in batches(number, _ENTRIES):
+        owner, offset = spread(number[some])
+        own = some[owner]
+        _draw(corners, slope, own, lowest[own] + offset, columns, top)
     height = np.where(np.isneginf(top), np.nan, top).reshape(rows, columns)
     return HeightGrid(west, south, cell, height)
 
@@ -146,19 +143,15 @@ def _draw(corners: Floats, slope: Floats, own: Integers, row: Integers, columns:
     first = np.clip(np.ceil(left - _HAIR), 0, columns).astype(np.int64)
     last = np.clip(np.floor(right + _HAIR), -1, columns - 1).astype(np.int64)
     number = np.maximum(last - first + 1, 0)
-    ends = np.cumsum(number)
-    at = 0
-    while at < len(own):
-        stop = max(at + 1, int(np.searchsorted(ends, (ends[at - 1] if at else 0) + _ENTRIES)))
-        span, offset = spread(number[at:stop])
-        span = span + at
+    for some in batches(number, _ENTRIES):
+        owner, offset = spread(number[some])
+        span = some[owner]
         column, mine = first[span] + offset, own[span]
         corner = corners[mine, 0]
         height = corner[:, 2] + slope[mine, 0] * (column - corner[:, 0]) + slope[mine, 1] * (row[span] - corner[:, 1])
         # Planes of slivers are steep, and a hair beside them may be far above.
         height = np.clip(height, corners[mine, :, 2].min(axis=1), corners[mine, :, 2].max(axis=1))
         np.maximum.at(top, row[span] * columns + column, height)
-        at = stop
 
 
 #: The topographic index, a in meters, that counts as dry and as wet: a ridge, and the floor of a valley with a brook.

@@ -320,10 +320,7 @@ _TRUNK = 0.03  # radius of the trunk over that of the crown
 
 
 def simple_crowns(
-    matrices: Floats,
-    size: tuple[float, float, float],
-    color: Sequence[float],
-    boxes: bool = False,
+    matrices: Floats, size: tuple[float, float, float], color: Sequence[float], boxes: bool = False
 ) -> Shapes:
     """Plants of one size as crowns, stretched and turned as their places are; of very many every second, or third.
 

@@ -469,13 +469,7 @@ class AssetParts(Arrays):
 
 
 class PlacedAssets:
-    """Assets and their instances, and what a cluster of an instance is in the world.
-
-    Parameters
-    ----------
-    assets : AssetTable
-    instances : Instances
-    """
+    """Assets and their instances, and what a cluster of an instance is in the world."""
 
     def __init__(self, assets: AssetTable, instances: Instances) -> None:
         self.assets, self.instances = assets, instances

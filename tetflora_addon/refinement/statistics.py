@@ -92,12 +92,7 @@ class Statistics:
 
 
 class Stopwatch:
-    """Adds up wall clock by stage.
-
-    Attributes
-    ----------
-    seconds : dict of str to float
-    """
+    """Adds up wall clock by stage, in ``seconds``."""
 
     def __init__(self) -> None:
         self.seconds: dict[str, float] = {}

@@ -333,12 +333,7 @@ def face_side(resolution: int) -> int:
 
 
 def widened_for(
-    camera: Camera,
-    margin: float,
-    flora: Flora,
-    subplants: Branches,
-    polygons: Polygons,
-    assets: AssetParts,
+    camera: Camera, margin: float, flora: Flora, subplants: Branches, polygons: Polygons, assets: AssetParts
 ) -> Camera:
     """The camera with a margin, in fractions of the image, and what depth of field and motion blur add to it.
 

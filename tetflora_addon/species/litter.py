@@ -264,10 +264,10 @@ def leaves_page(species: Species, page: Mapping[str, Any]) -> dict[str, Any] | N
     stem = middle["length"][0]
     color, variation = _autumn(species, leaf)
     around |= {
-        "length": [round(radius / stem, 4), round(0.3 * radius / stem, 4)],
+        "length": _pair(radius / stem, 0.3 * radius / stem),
         "thickness": _THREAD,
         "sides": 3,
-        "leaves": [round(number / _ARMS, 4), round(0.2 * number / _ARMS, 4)],
+        "leaves": _pair(number / _ARMS, 0.2 * number / _ARMS),
         "leaf_start": 0.1,
         "leaf_color": [color, variation],
         "leaf_color_tip": color,

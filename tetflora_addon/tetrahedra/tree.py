@@ -164,9 +164,7 @@ def divide_in_eight(vertices: Floats, diagonal: Integers | None = None) -> tuple
     return plane_through(through[..., :3, :], through[..., 3, :]), points[every, _CHILDREN[diagonal]]
 
 
-def divide_by_shape(
-    vertices: Floats,
-) -> tuple[Floats, Floats, Mask]:
+def divide_by_shape(vertices: Floats) -> tuple[Floats, Floats, Mask]:
     """Divide tetrahedra into eight in the way that keeps them in better shape, so that no slivers arise.
 
     Both ways give eight of equal volume, three planes deep. Worst qualities are compared, with a `HANDICAP` on the

@@ -20,6 +20,7 @@ from tetflora_addon.blender.biomes import adding, files, library
 from tetflora_addon.blender.file_library import as_text
 from tetflora_addon.blender.placing import populations, rules
 from tetflora_addon.blender.preferences import preferences
+from tetflora_addon.blender.settings import with_identity
 from tetflora_addon.blender.species.edits import catalog
 from tetflora_addon.blender.stands.growing import keep_year
 from tetflora_addon.blender.worker import run_to_end
@@ -288,7 +289,7 @@ def test_neighbors_blend():
     add(floor, land)
     meadow = biomes()[0].uid
     before = places(meadow)
-    run_to_end(adding.plant_biome_steps(scene(), depsgraph(), files.find_biome(scene(), meadow)))
+    run_to_end(adding.plant_biome_steps(scene(), depsgraph(), with_identity(scene().tetflora.layers, meadow)))
     assert np.array_equal(places(meadow), before), "planting again changes nothing"
     add(replace(floor, name="Other"), land)
     other = biomes()[1]
@@ -297,12 +298,12 @@ def test_neighbors_blend():
 
     assert awaits_update(files.layers_of(scene(), meadow)[0]), "the mask of one is the other's limit"
     for uid in (meadow, other.uid):
-        run_to_end(adding.plant_biome_steps(scene(), depsgraph(), files.find_biome(scene(), uid)))
-    east, west = places(meadow), places(files.find_biome(scene(), biomes()[1].uid).uid)
+        run_to_end(adding.plant_biome_steps(scene(), depsgraph(), with_identity(scene().tetflora.layers, uid)))
+    east, west = places(meadow), places(with_identity(scene().tetflora.layers, biomes()[1].uid).uid)
     assert abs(len(east) + len(west) - len(before)) < 5.0 * np.sqrt(len(before))
     assert east[:, 0].mean() > 2.0 and west[:, 0].mean() < -2.0
-    files.find_biome(scene(), meadow).gives_way = False
-    run_to_end(adding.plant_biome_steps(scene(), depsgraph(), files.find_biome(scene(), meadow)))
+    with_identity(scene().tetflora.layers, meadow).gives_way = False
+    run_to_end(adding.plant_biome_steps(scene(), depsgraph(), with_identity(scene().tetflora.layers, meadow)))
     assert np.array_equal(places(meadow), before)
 
 

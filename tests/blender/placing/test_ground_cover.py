@@ -308,7 +308,7 @@ def test_habitats_are_written_to_files_and_read_again():
     _cover()
     data = population_data.population_data(_group().layers[1])
     read = populations.add_population(bpy.context.scene)
-    population_data.fill_population(read, data, bpy.context.scene, [])
+    population_data.fill_population(read, data, bpy.context.scene)
     assert [(e.species, e.habitat, e.shed_by) for e in read.mix] == [
         (e.species, e.habitat, e.shed_by) for e in _group().layers[1].mix
     ]

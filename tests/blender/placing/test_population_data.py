@@ -43,11 +43,11 @@ def _numbers(name):
 
 
 def _read(data):
-    """A new layer by what a file says, checked; and what the scene lacks."""
+    """A new layer by what a file says, checked."""
     population_data.check_population("layer 1", data)
-    read, missing = populations.add_population(bpy.context.scene), []
-    population_data.fill_population(read, data, bpy.context.scene, missing)
-    return read, missing
+    read = populations.add_population(bpy.context.scene)
+    population_data.fill_population(read, data, bpy.context.scene)
+    return read
 
 
 @settings(
@@ -69,25 +69,23 @@ def test_what_is_written_comes_back(data):
         entry.companion_strength = data.draw(st.floats(-1.0, 1.0, width=32))
     before, name = _values(population), population.name
     written = json.loads(json.dumps(population_data.population_data(population)))
-    read, missing = _read(written)
-    assert missing == [] and written["name"] == name
-    assert _values(read) == before
+    assert written["name"] == name
+    assert _values(_read(written)) == before
     bpy.context.scene.tetflora.layers.clear()
 
 
-def test_images_and_collections_are_found_by_name_or_said_to_be_missing():
+def test_images_and_collections_are_found_by_name_or_not_at_all():
     image, roads = bpy.data.images.new("mask", 4, 4), bpy.data.collections.new("roads")
     data = population_data.population_data(_add(image=image, paths=roads))
     bpy.data.collections.remove(roads)
     bpy.data.objects.remove(bpy.data.objects["ground"])
-    read, missing = _read(data)
-    assert (read.image, read.paths) == (image, None)
-    assert missing == ['the collection "roads"', 'the ground "ground"']
+    read = _read(data)
+    assert (read.image, read.paths, len(read.grounds)) == (image, None, 0)
 
 
 def test_what_a_file_does_not_say_is_as_in_a_new_scene():
     bpy.context.scene.tetflora.populate.clumping = 0.5
-    read, _ = _read({"name": "x", "slope_max": 12.5})
+    read = _read({"name": "x", "slope_max": 12.5})
     assert (read.clumping, read.count) == (0.0, 100)
     assert read.slope_max == pytest.approx(0.21816616)  # 12.5 degrees
 

@@ -21,8 +21,8 @@ def preview():
     """Timers never fire here, so that the tests do what they would do."""
     yield species
     species.show(bpy.context.scene, False)
-    if bpy.app.timers.is_registered(species._on_timer):
-        bpy.app.timers.unregister(species._on_timer)
+    if bpy.app.timers.is_registered(species.refresh):
+        bpy.app.timers.unregister(species.refresh)
 
 
 def _toggle():
@@ -67,10 +67,10 @@ def test_follows_changes_and_keeps_the_last_sound_plant(preview):
         lambda: setattr(editor, "species_choice", "conifer"),
         bpy.ops.tetflora.duplicate_species,
     ):
-        if timers.is_registered(preview._on_timer):
-            timers.unregister(preview._on_timer)
+        if timers.is_registered(preview.refresh):
+            timers.unregister(preview.refresh)
         change()
-        assert timers.is_registered(preview._on_timer)
+        assert timers.is_registered(preview.refresh)
     preview.refresh()
     (shown,) = _objects()
     assert shown.name == name

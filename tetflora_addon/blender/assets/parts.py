@@ -39,12 +39,9 @@ from ..scene.objects import (
     materials_of,
 )
 
-#: Of nodes, where they stand in the editor and how they look there.
-_IDLE = {"rna_type", "name", "label", "width", "height", "color", "location", "location_absolute", "parent", "select"}
-_IDLE |= {"bl_idname", "bl_label", "bl_description", "bl_icon", "bl_static_type", "warning_propagation", "dimensions"}
-_IDLE |= {"bl_width_default", "bl_width_min", "bl_width_max", "bl_height_default", "bl_height_min", "bl_height_max"}
-_IDLE |= {"internal_links", "inputs", "outputs", "color_tag", "hide", "use_custom_color", "show_options"}
-_IDLE |= {"show_preview", "show_texture", "image_user", "texture_mapping", "color_mapping"}
+#: What all nodes have: where they stand in the editor and how they look there; and what only refers to others.
+_IDLE = {one.identifier for one in bpy.types.Node.bl_rna.properties} - {"type", "mute"}
+_IDLE |= {"image_user", "texture_mapping", "color_mapping"}
 # Content of packed images by identity and length: they are read once.
 _packed: dict[tuple[int, int], str] = {}
 

@@ -41,7 +41,7 @@ from ..scene.fields import fields_of, read_field
 from ..settings import BIOME, SCATTER, with_identity
 from ..species.edits import catalog, new_identifier, species_data, store_species, unknown_text
 from ..stands.growing import GrownStand, again_steps, new_stand_steps
-from .files import Biome, find_biome, layers_of, pages_of, stand_settings, stands_of
+from .files import Biome, layers_of, pages_of, stand_settings, stands_of
 from .layers import index_of
 from .library import GROUND, data_of
 
@@ -99,7 +99,7 @@ def add_biome_steps(
             if layer["kind"] == "stand":
                 continue
             population = add_population(scene, grounds, name=layer["name"])
-            fill_population(population, layer, scene, [])
+            fill_population(population, layer, scene)
             _lay_on(population, grounds)
             population.biome, population.covers = uid, uid if layer["kind"] == "cover" else ""
             if layer["kind"] == "cover" and "as_field" not in layer:
@@ -199,7 +199,7 @@ def _plant(data: JobData, uid: str, stands: Sequence[tuple[str, int]], without: 
         raise SceneError(bare[0])
     yield Progress(1.0 - _SOIL, "Soil")
     depsgraph.update()
-    biome = find_biome(scene, uid)
+    biome = with_identity(scene.tetflora.layers, uid)
     grounds = [entry.object for entry in biome.grounds if entry.object is not None] if biome is not None else []
     kept = lay_biome_soil(depsgraph, grounds) if grounds else []
     return BiomeResult(biome.name if biome is not None else "", layers, bare, kept)

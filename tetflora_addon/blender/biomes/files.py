@@ -17,7 +17,7 @@ import numpy as np
 
 from ...errors import SceneError, SpeciesError, quoted
 from ...files import IDENTIFIER_RULE, is_identifier, parse_json, read_whole
-from ...formats import FORMATS
+from ...formats import FORMATS, newest
 from ...planting.site import Limits
 from ...species.schema import species_from_dict
 from ..file_library import MAX_FILE_BYTES, as_text
@@ -27,7 +27,6 @@ from ..placing.population_data import (
     check_settings,
     check_species,
     check_text,
-    in_newest_format,
     list_of,
     population_data,
     refuse_constant,
@@ -35,8 +34,8 @@ from ..placing.population_data import (
     value_for,
 )
 from ..placing.properties import TetFloraLayer
-from ..placing.rules import MASK, active_population, grounds_of, limits_of_zone
-from ..settings import BIOME, SCATTER, active_in, with_identity
+from ..placing.rules import MASK, active_population, biome_of, grounds_of, limits_of_zone
+from ..settings import BIOME, SCATTER, active_in
 from ..species.edits import find_edit, new_identifier, species_data
 from ..stands.growing import is_stand
 from ..stands.properties import TetFloraStand, TetFloraStandEntry
@@ -91,8 +90,14 @@ def read_biome(path: Path) -> Biome:
     SceneError
         It cannot be read, or breaks a rule of the format; names file and key.
     """
+    return _read(path)[0]
+
+
+def _read(path: Path) -> tuple[Biome, bytes]:
+    """A biome that was checked, and the content of its file."""
     try:
-        return checked(parse_json(read_whole(path, MAX_FILE_BYTES), refuse_constant), path.stem)
+        content = read_whole(path, MAX_FILE_BYTES)
+        return checked(parse_json(content, refuse_constant), path.stem), content
     except OSError as error:
         raise SceneError(f"{path.name}: cannot read the file: {error.strerror}") from None
     except (ValueError, SpeciesError) as error:
@@ -107,7 +112,13 @@ def checked(data: Any, identifier: str) -> Biome:
     ValueError, SpeciesError
         Something is not as it must be; names the key.
     """
-    data = in_newest_format(data, FORMAT, "biome", "files of biomes")
+    if isinstance(data, dict) and {"format", "version"} <= data.keys():  # keys are checked next
+        if data["format"] != FORMAT:
+            raise ValueError(f'"format" is {quoted(data["format"])}; files of biomes have "{FORMAT}"')
+        try:
+            data = newest("biome", data, data["version"])
+        except ValueError as error:
+            raise ValueError(f'"version" {error}') from None
     check_keys("the file", data, _KEYS, _KEYS | _MORE)
     for key in ("name", "description"):
         check_text(f'"{key}"', data.get(key, ""))
@@ -146,7 +157,7 @@ def biome_data(
     data: dict[str, Any] = {"format": FORMAT, "version": FORMATS["biome"], "name": name, "description": description}
     stored = data_of(biome) if biome is not None else {}
     data |= {key: value for key, value in stored.items() if key in ("ground", "season") and value}
-    layers = [_layer_data(population) for population in populations]
+    layers = [{"kind": "cover" if one.covers else "population", **population_data(one)} for one in populations]
     stands = [] if biome is None else [_stand_data(field) for field in stands_of(scene, biome.uid)]
     parts = [part for layer in (*stands, *layers) for part in layer["species"]]
     names = {part.get("shed_by", "") for part in parts} - {""}  # what they shed is made from them
@@ -161,36 +172,24 @@ def biome_data(
             if getattr(limits, one.name) not in (one.default, np.float32(one.metadata.get("default", one.default)))
         }
         data |= {"limits": changed} if changed else {}
-        mask = settings_data(biome, MASK, changed=True)
+        mask = settings_data(biome, MASK)
         data |= {"mask": mask} if mask else {}
         data |= {} if biome.gives_way else {"gives_way": False}
     data["layers"] = [*stands, *layers]
     return data
 
 
-def _layer_data(population: bpy.types.PropertyGroup) -> dict[str, Any]:
-    """What differs from a new population; grounds, masks and collections by their names."""
-    return {"kind": "cover" if population.covers else "population", **population_data(population, changed=True)}
-
-
 def _stand_data(stand: bpy.types.Object) -> dict[str, Any]:
     """What differs from a new stand."""
     group = stand.tetflora.stand
-    layer = {"kind": "stand", "name": stand.name, **settings_data(group, stand_settings(), changed=True)}
-    return layer | {"species": [settings_data(entry, STAND_ENTRY) for entry in group.species]}
-
-
-def find_biome(scene: bpy.types.Scene, uid: str) -> bpy.types.PropertyGroup | None:
-    """A biome of a scene by its identity."""
-    return with_identity(scene.tetflora.layers, uid)
+    layer = {"kind": "stand", "name": stand.name, **settings_data(group, stand_settings())}
+    return layer | {"species": [settings_data(entry, STAND_ENTRY, STAND_ENTRY) for entry in group.species]}
 
 
 def active_biome(scene: bpy.types.Scene) -> bpy.types.PropertyGroup | None:
     """The biome that is the active layer, or that this belongs to; None where there is none."""
     active = active_in(scene.tetflora, "layers")
-    if active is None or active.kind == BIOME:
-        return active
-    return find_biome(scene, active.biome) if active.biome else None
+    return active if active is None or active.kind == BIOME else biome_of(scene, active)
 
 
 def layers_of(scene: bpy.types.Scene, uid: str) -> list[bpy.types.PropertyGroup]:
@@ -249,7 +248,7 @@ def _check_layer(where: str, layer: Any) -> None:
         check_settings(where, layer, TetFloraStand, stand_settings())
         check_species(where, layer["species"], TetFloraStandEntry, STAND_ENTRY)
     else:
-        check_population(where, layer, ("kind",))
+        check_population(where, layer)
         if not layer.get("species"):
             raise ValueError(f'{where} has no "species"')
 
@@ -337,12 +336,7 @@ def import_biome(path: Path, replace: bool) -> str:
     SceneError
         The file breaks a rule of the format, or another one of its name is there.
     """
-    read_biome(path)
-    try:
-        content = read_whole(path, MAX_FILE_BYTES)
-    except OSError as error:
-        raise SceneError(f"{path.name}: cannot read the file: {error.strerror}") from None
-    library.OWN_FILES.store(path.stem, content, replace, library.picture_file(path))
+    library.OWN_FILES.store(path.stem, _read(path)[1], replace, library.picture_file(path))
     return path.stem
 
 

@@ -39,15 +39,8 @@ from .contents import SceneContents, load_for, read_scene, settings_from
 _MAX_SPECIES = 64
 _CHOICES = ("proxy_kind", "baked_light", "expand_everything", "asset_detail")
 #: Settings of a scene that results do not depend on.
-_IGNORED = {
-    "statistics",
-    "share_frames",
-    "cell_length",
-    "cell_turn",
-    "refine_at_render",
-    "auto_refine",
-    "follow_viewport",
-}
+_IGNORED = {"statistics", "share_frames", "cell_length", "cell_turn"}
+_IGNORED |= {"refine_at_render", "auto_refine", "follow_viewport"}
 
 
 @dataclass

@@ -145,12 +145,12 @@ def write_assets(run: _Run, plan: AssetPlan) -> Job[None]:
         add_instances(results, f"{target.name} {number:03d}", source, bound.matrices[at], ids[at], shown)
         yield progress
     statistics.instances_whole = len(whole) + int(alone[owner[plan.originals]].sum())
-    for own, make in ((plan.meshes, _clusters), (plan.kites, _kites)):
+    for own, maker in ((plan.meshes, _clusters), (plan.kites, _kites)):
         for target in range(len(bound.targets)):
             rows = np.flatnonzero(asset[own.instance] == target)
             if len(rows):
                 cluster = own.cluster[rows] - bound.placed.assets.root[target]
-                yield from _write_clusters(run, target, cluster, own.instance[rows], ids, make is _kites, make)
+                yield from _write_clusters(run, target, cluster, own.instance[rows], ids, maker)
     for number, shown in enumerate(bound.owners):
         if _scatters(shown) and not alone[number]:
             run.originals.append(shown)
@@ -202,11 +202,10 @@ def _write_clusters(
     cluster: Integers,
     instance: Integers32,
     ids: Integers32,
-    kites: bool,
     maker: Callable[[_Run, int], Maker],
 ) -> Job[None]:
     """Meshes of the clusters of one asset, each once, and instances of them."""
-    results, bound, make = run.results, run.bound, maker(run, target)
+    results, bound, make, kites = run.results, run.bound, maker(run, target), maker is _kites
     name = bound.targets[target].name + (" kites" if kites else "")
     progress = Progress(0.94, f'Making clusters of "{name}"')
     yield progress

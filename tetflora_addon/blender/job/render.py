@@ -162,12 +162,9 @@ def on_save_post(_path: object, _other: object = None) -> None:
 
 def on_load_post(_path: object, _other: object = None) -> None:
     """After a file was read: forget earlier renders, show objects whose results it lacks, migrate properties."""
+    global _rendering
     clear_unreadable()
-    _rendering.busy, _rendering.outer = False, 0
-    _rendering.scenes.clear()
-    _rendering.raised.clear()
-    _rendering.hidden.clear()
-    _rendering.lifted.clear()
+    _rendering = _Rendering()
     failed_frames.clear()
     frame_cache.reset()
     unpack_override_marks()

@@ -33,7 +33,7 @@ from ..worker import steps_in_thread
 from .canopy import canopy_of, floor_steps, is_cover, shedder_of, standing
 from .distances import HECTARE
 from .populations import PlacedPlants, add_population, make_plants_steps, refuse_frozen, restored, still_there
-from .rules import active_population, copy_settings, grounds_of
+from .rules import active_population, checked_grounds, copy_settings, grounds_of
 from .terrain import MASKS, read_ground
 
 NAME, FALLEN_LEAVES = "Ground cover", "Fallen leaves"
@@ -153,11 +153,7 @@ def _begun(
     found = cover_of(scene, population.uid or ANYBODY, fallen)
     if found is not None:
         refuse_frozen(found)
-    grounds = grounds_of(scene, population) if grounds is None else list(grounds)
-    if not grounds:
-        raise SceneError(
-            f'"{population.name}" has no ground in this scene; select meshes and click Use Selected Meshes'
-        )
+    grounds = checked_grounds(scene, population) if grounds is None else list(grounds)
     data.add_objects(grounds)
     yield from crown_steps(progress, scene, standing(scene))
     return grounds

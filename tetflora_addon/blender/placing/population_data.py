@@ -5,7 +5,7 @@
 What cannot be is refused by a `ValueError` that names the key.
 """
 
-from collections.abc import Collection, Iterable, Mapping
+from collections.abc import Collection, Container, Iterable, Mapping
 from math import degrees, radians
 from sys import float_info
 from typing import Any
@@ -13,7 +13,6 @@ from typing import Any
 import bpy
 import numpy as np
 
-from ... import formats
 from ...errors import NAME, quoted, readable
 from ...files import IDENTIFIER_RULE, is_identifier
 from ..settings import limits_of
@@ -27,12 +26,12 @@ MAX_ENTRIES = 1000
 _IDENTIFIERS = {"species", "companion", "shed_by"}
 
 
-def population_data(population: TetFloraLayer, changed: bool = False) -> dict[str, Any]:
-    """A population as a file has it, all of it or what differs from a new one."""
+def population_data(population: TetFloraLayer) -> dict[str, Any]:
+    """A population as a file has it: what differs from a new one."""
     data: dict[str, Any] = {"name": population.name}
     data["grounds"] = [entry.object.name for entry in population.grounds if entry.object is not None]
-    data["species"] = [settings_data(entry, ENTRY, changed, "species") for entry in population.mix]
-    return data | settings_data(population, [p.identifier for p in simple_settings(population)], changed)
+    data["species"] = [settings_data(entry, ENTRY, {"species"}) for entry in population.mix]
+    return data | settings_data(population, [p.identifier for p in simple_settings(population)])
 
 
 def simple_settings(group: type[bpy.types.PropertyGroup] | bpy.types.PropertyGroup) -> list[bpy.types.Property]:
@@ -40,10 +39,8 @@ def simple_settings(group: type[bpy.types.PropertyGroup] | bpy.types.PropertyGro
     return [p for p in settings_of(group) if p.type != 'COLLECTION']
 
 
-def settings_data(
-    group: bpy.types.PropertyGroup, names: Iterable[str], changed: bool = False, always: str = ""
-) -> dict[str, Any]:
-    """Settings of a group as files have them, all or those that differ from their defaults, and one of them always."""
+def settings_data(group: bpy.types.PropertyGroup, names: Iterable[str], always: Container[str] = ()) -> dict[str, Any]:
+    """Settings of a group as files have them: those that differ from their defaults, and some of them always."""
     data = {}
     for name in names:
         prop, value = group.bl_rna.properties[name], getattr(group, name)
@@ -51,20 +48,21 @@ def settings_data(
             value, default = value.name if value is not None else None, None
         else:
             value, default = value_for(prop, value), value_for(prop, prop.default)
-        if name == always or not changed or value != default:
+        if name in always or value != default:
             data[name] = value
     return data
 
 
-def set_setting(group: bpy.types.PropertyGroup, name: str, value: Any, missing: list[str] | None = None) -> None:
-    """Give a group a setting as a checked file has it; datablocks that are not there are added to ``missing``."""
+def set_setting(group: bpy.types.PropertyGroup, name: str, value: Any) -> None:
+    """Give a group a setting as a checked file has it; none for an image or a collection that is not there."""
     prop = group.bl_rna.properties[name]
-    if prop.type == 'POINTER':
-        value = _named(prop.fixed_type.identifier, value, [] if missing is None else missing)
+    if prop.type == 'POINTER' and value is not None:
+        known = bpy.data.images if prop.fixed_type.identifier == "Image" else bpy.data.collections
+        value = known.get(value)
     setattr(group, name, radians(value) if prop.type == 'FLOAT' and prop.subtype == 'ANGLE' else value)
 
 
-def check_population(where: str, entry: Any, more: Iterable[str] = ()) -> None:
+def check_population(where: str, entry: Any) -> None:
     """Refuse what cannot be a population with a `ValueError`.
 
     Parameters
@@ -73,11 +71,9 @@ def check_population(where: str, entry: Any, more: Iterable[str] = ()) -> None:
         What messages call it.
     entry : Any
         Decoded.
-    more : iterable of str
-        Keys that somebody else checks.
     """
     simple = {p.identifier for p in simple_settings(TetFloraLayer)}
-    check_keys(where, entry, {"name"}, {"name", "grounds", "species", *simple, *more})
+    check_keys(where, entry, {"name"}, {"kind", "name", "grounds", "species", *simple})
     check_text(f'{where}: "name"', entry["name"])
     for name in list_of(f'{where}: "grounds"', entry.get("grounds", [])):
         check_text(f'{where}: "grounds"', name)
@@ -105,44 +101,20 @@ def check_settings(
             check_value(f'{where}: "{key}"', kind.bl_rna.properties[key], entry[key])
 
 
-def fill_population(
-    population: TetFloraLayer, entry: dict[str, Any], scene: bpy.types.Scene, missing: list[str]
-) -> None:
-    """Give a new population what a checked entry says, and defaults for the rest."""
+def fill_population(population: TetFloraLayer, entry: dict[str, Any], scene: bpy.types.Scene) -> None:
+    """Give a new population what a checked entry says, as far as the scene has it, and defaults for the rest."""
     for prop in simple_settings(population):
         name = prop.identifier
         population.property_unset(name)
         if name in entry:
-            set_setting(population, name, entry[name], missing)
+            set_setting(population, name, entry[name])
     population.mix.clear()
     for part in entry.get("species", []):
         new = population.mix.add()
         for key, value in part.items():
             setattr(new, key, value)
-    found = [(name, scene.objects.get(name)) for name in entry.get("grounds", [])]
-    missing += [f'the ground "{name}"' for name, obj in found if obj is None]
-    set_grounds(population, [obj for _, obj in found if obj is not None and obj.type == 'MESH'])
-
-
-def _named(kind: str, name: str | None, missing: list[str]) -> bpy.types.ID | None:
-    if name is None:
-        return None
-    found = (bpy.data.images if kind == "Image" else bpy.data.collections).get(name)
-    if found is None:
-        missing.append(f'the {kind.lower()} "{name}"')
-    return found
-
-
-def in_newest_format(data: Any, expected: str, what: str, files: str) -> Any:
-    """A decoded file in the newest format; one of another kind or of a later version is refused with a `ValueError`."""
-    if not isinstance(data, dict) or not {"format", "version"} <= data.keys():
-        return data  # keys are checked next
-    if data["format"] != expected:
-        raise ValueError(f'"format" is {quoted(data["format"])}; {files} have "{expected}"')
-    try:
-        return formats.newest(what, data, data["version"])
-    except ValueError as error:
-        raise ValueError(f'"version" {error}') from None
+    found = (scene.objects.get(name) for name in entry.get("grounds", []))
+    set_grounds(population, [obj for obj in found if obj is not None and obj.type == 'MESH'])
 
 
 def check_value(where: str, prop: bpy.types.Property, value: Any) -> None:

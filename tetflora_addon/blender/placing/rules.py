@@ -90,7 +90,7 @@ def come_before(scene: bpy.types.Scene, biome: bpy.types.PropertyGroup) -> list[
 
 def zone_values(scene: bpy.types.Scene, population: bpy.types.PropertyGroup) -> list[Any]:
     """All that decides the zone of a population or stand, for its fingerprint; empty without a biome."""
-    biome = biome_of(scene, population) if population.biome else None
+    biome = biome_of(scene, population)
     if biome is None:
         return []
     values = []
@@ -134,14 +134,14 @@ def zoned(
     normal = np.abs(normal) / np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-12)
     each = np.repeat(np.arange(count), 3)
     spots = Spots(each, np.tile(np.eye(3), (count, 1)), corners.reshape(-1, 3), normal[each])
-    wet = wet_ground(corners) if any(zone.asks_for_water for zone in zones) else None
+    wet = wet_ground(corners) if any(zone.limits.ask_for_water for zone in zones) else None
     share = np.prod([zone.share(spots, wet) for zone in zones], axis=0).reshape(count, 3)
     return replace(ground, weight=share if ground.weight is None else share * ground.weight)
 
 
 def _zone(biome: bpy.types.PropertyGroup, grounds: Sequence[bpy.types.Object], depsgraph: bpy.types.Depsgraph) -> Zone:
     limits = limits_of_zone(biome)
-    lines = () if biome.paths is None else lines_within(biome.paths, depsgraph, "Paths")
+    lines = () if biome.paths is None else lines_within(biome.paths, depsgraph)
     mask = {name: getattr(biome, name) for name in MASK}
     if not (biome.vertex_group or biome.image):
         return Zone(limits, lines=distance_lines(lines, limits))
@@ -306,6 +306,17 @@ def grounds_of(scene: bpy.types.Scene, population: bpy.types.PropertyGroup) -> l
     return [o for o in meshes if scene in o.users_scene]
 
 
+def checked_grounds(scene: bpy.types.Scene, population: bpy.types.PropertyGroup) -> list[bpy.types.Object]:
+    """The same; a `SceneError` where there are none."""
+    if not (grounds := grounds_of(scene, population)):
+        raise SceneError(
+            f'"{population.name}" has no ground in this scene; select meshes and click Use Selected Meshes'
+            if population.uid
+            else "Select a mesh to plant on"
+        )
+    return grounds
+
+
 def set_grounds(population: bpy.types.PropertyGroup, grounds: Iterable[bpy.types.Object]) -> None:
     """Let a population grow on these meshes instead."""
     population.grounds.clear()
@@ -365,13 +376,7 @@ def read_search(
     for entry in population.mix:
         if entry.species and entry.species not in known:
             raise SceneError(unknown_text(entry.species))
-    grounds = grounds_of(scene, population) if grounds is None else grounds
-    if not grounds:
-        raise SceneError(
-            f'"{population.name}" has no ground in this scene; select meshes and click Use Selected Meshes'
-            if population.uid
-            else "Select a mesh to plant on"
-        )
+    grounds = checked_grounds(scene, population) if grounds is None else grounds
     for group in (population, *population.mix):
         check_limits(group, f'"{population.name}"')
     rules, species = rules_from(population)

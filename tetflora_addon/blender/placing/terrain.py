@@ -178,9 +178,9 @@ def _path(line: Line, distance: float) -> Path:
     return Path(points, distance + line.half_width)
 
 
-def lines_within(collection: bpy.types.Collection, depsgraph: bpy.types.Depsgraph, setting: str) -> tuple[Floats, ...]:
-    """Curves of a collection as lines on the map, (k, 2) each; closed ones end where they begin."""
-    return tuple(_path(line, 0.0).points for line in _lines(collection, depsgraph, setting))
+def lines_within(paths: bpy.types.Collection, depsgraph: bpy.types.Depsgraph) -> tuple[Floats, ...]:
+    """Curves of a collection of paths as lines on the map, (k, 2) each; closed ones end where they begin."""
+    return tuple(_path(line, 0.0).points for line in _lines(paths, depsgraph, "Paths"))
 
 
 def _lines(

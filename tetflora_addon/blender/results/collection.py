@@ -144,12 +144,7 @@ class Results:
         return self._shared[key]
 
     def add_object(
-        self,
-        name: str,
-        made: bpy.types.Object,
-        kind: str,
-        sources: Sequence[bpy.types.ID] = (),
-        placed: bool = False,
+        self, name: str, made: bpy.types.Object, kind: str, sources: Sequence[bpy.types.ID] = (), placed: bool = False
     ) -> bpy.types.Object:
         """Add an object that was made elsewhere, under a name by `name_for`.
 

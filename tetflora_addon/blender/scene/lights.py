@@ -6,15 +6,14 @@ World node trees can be arbitrary. Only the background that leads to the output 
 feeds its color. Blender's skies cannot be evaluated outside of a render; a few measured numbers describe them.
 """
 
-import json
 from dataclasses import dataclass
-from pathlib import Path
 
 import bpy
 import numpy as np
 
 from ...arrays import Floats
 from ...emission.light import Sources
+from ...files import beside
 from ...light.sources import World
 from ...refinement.lights import Light
 from ..attributes import image_pixels, linear_rgb, world_matrix
@@ -32,7 +31,7 @@ _ELEVATIONS = (2.0, 10.0, 30.0, 60.0, 90.0)
 # Radiance above the horizon M + B (z − ½) + C f, with z up and f toward the sun's azimuth; mean radiance D below it;
 # irradiance of the sun's disc. RGB each, measured in Cycles 5.2 (128 × 64 pixels) with the node's own defaults, such
 # that mean, irradiance of level ground and of what stands toward the sun are kept. 4.5 has the same within 2 %.
-_SKIES: dict[str, list[list[float]]] = json.loads(Path(__file__).with_name("skies.json").read_text(encoding="utf-8"))
+_SKIES: dict[str, list[list[float]]] = beside(__file__, "skies.json")
 
 
 def read_lights(depsgraph: bpy.types.Depsgraph) -> tuple[Light, ...]:

@@ -11,6 +11,7 @@ import time
 import traceback
 from collections.abc import Callable
 from functools import cache
+from pathlib import Path
 
 import blf
 import bpy
@@ -38,6 +39,7 @@ _MOMENT = 0.03
 _LEAST, _MOST = 500, 20_000
 _FROZEN = (1.0, 0.75, 0.2, 1.0)
 _TEXT, _COMPLAINT = (0.95, 0.95, 0.95, 1.0), (1.0, 0.7, 0.3, 1.0)
+_SHADER = Path(__file__).with_name("crown")
 _handles: list[object] = []
 
 
@@ -133,41 +135,11 @@ def _standing(crowns: CrownPoints) -> gpu.types.GPUVertBuf:
     return buffer
 
 
-#: A point as high as its plant, and within it the outline of trunk and crown: from the side that of `light_plants`, the
-#: rounder the more one looks from above.
-_VERTEX = """
-void main() {
-  float side = sqrt(max(1.0 - view.y * view.y, 0.0)), wide = max(form.z, form.w) * look.a;
-  gl_Position = matrix * vec4(pos + vec3(0.0, 0.0, 0.5 * form.y), 1.0);
-  float tall = 0.5 * side * form.y + view.y * wide, half_size = max(max(tall, wide), 1e-6);
-  pixels = 2.0 * half_size * view.x / max(gl_Position.w, 1e-6);
-  gl_PointSize = max(pixels, 1.5);
-  if (form.y > eye.w * distance(pos, eye.xyz)) {  // it has faces
-    gl_Position = vec4(2.0, 2.0, 2.0, 1.0);
-  }
-  color = look.rgb;
-  shape = vec4(tall, form.z * look.a, form.w * look.a, 0.012 * form.y) / half_size;
-  low = clamp(form.x / max(form.y, 1e-6), 0.0, 0.95);
-}
-"""
-_FRAGMENT = """
-void main() {
-  float x = abs(2.0 * gl_PointCoord.x - 1.0), y = (1.0 - 2.0 * gl_PointCoord.y) / shape.x;
-  float t = (0.5 * y + 0.5 - low) / (1.0 - low);
-  float wide = t < 0.25 ? shape.y * t / 0.25 : mix(shape.y, shape.z, min((t - 0.25) / 0.4, 1.0));
-  wide = t > 0.65 ? shape.z * (1.0 - t) / 0.35 : wide;
-  wide = mix(max(wide, shape.w), max(shape.y, shape.z) * sqrt(max(1.0 - y * y, 0.0)), view.y);
-  if (pixels > 3.0 && (abs(y) > 1.0 || x > wide)) {
-    discard;
-  }
-  float shone = mix(0.6, 0.95, clamp(t + view.y, 0.0, 1.0));
-  fragColor = vec4(pow(shone * color, vec3(2.2)), 1.0);  // linear: the viewport's buffer encodes what it is given
-}
-"""
-
-
 @cache
 def _crown_shader() -> gpu.types.GPUShader:
+    """A point as high as its plant, and within it the outline of trunk and crown: from the side that of `light_plants`,
+    the rounder the more one looks from above.
+    """
     passed = gpu.types.GPUStageInterfaceInfo("crown_interface")
     for kind, name in (('VEC3', "color"), ('VEC4', "shape"), ('FLOAT', "low"), ('FLOAT', "pixels")):
         passed.flat(kind, name)
@@ -179,8 +151,8 @@ def _crown_shader() -> gpu.types.GPUShader:
         info.vertex_in(number, kind, name)
     info.vertex_out(passed)
     info.fragment_out(0, 'VEC4', "fragColor")
-    info.vertex_source(_VERTEX)
-    info.fragment_source(_FRAGMENT)
+    info.vertex_source(_SHADER.with_suffix(".vert").read_text(encoding="utf-8"))
+    info.fragment_source(_SHADER.with_suffix(".frag").read_text(encoding="utf-8"))
     return gpu.shader.create_from_info(info)
 
 

@@ -85,11 +85,6 @@ def show(scene: bpy.types.Scene, on: bool) -> None:
         _clear()
 
 
-def error() -> str:
-    """Why there are no dots, empty if there are some."""
-    return _state.error
-
-
 def schedule() -> None:
     """Place dots anew soon; many changes in a row are one placing."""
     if _state.scene is not None and not bpy.app.background:

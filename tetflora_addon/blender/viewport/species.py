@@ -70,11 +70,7 @@ def schedule() -> None:
 
 def _call_soon() -> None:
     # A large plant must not keep the window busy while a slider is dragged.
-    call_soon(_on_timer, max(_SOON, _state.seconds))
-
-
-def _on_timer() -> None:
-    refresh()
+    call_soon(refresh, max(_SOON, _state.seconds))
 
 
 def refresh() -> None:
@@ -167,7 +163,7 @@ def _on_undo(_scene: bpy.types.Scene, _other: object = None) -> None:
 
 def _on_load_pre(_path: object, _other: object = None) -> None:
     _state.scene = None
-    call_off(_on_timer)
+    call_off(refresh)
 
 
 _HANDLERS = Handlers(
@@ -193,6 +189,6 @@ def unregister() -> None:
     del bpy.types.WindowManager.tetflora_species
     _remove()
     _state.scene = None
-    call_off(_on_timer)
+    call_off(refresh)
     _HANDLERS.unregister()
     edits.listeners.remove(schedule)

@@ -157,12 +157,7 @@ class TetFloraPreview(bpy.types.PropertyGroup):
             ),
             ('LEVEL', "Level", "How often space was split: dark is rarely, bright is often", 1),
             ('VISIBILITY', "Visibility", "Fraction that the camera sees: dark is hidden", 2),
-            (
-                'CONTRIBUTION',
-                "Contribution",
-                "Number of pixels that it affects: dark is few, bright is many",
-                3,
-            ),
+            ('CONTRIBUTION', "Contribution", "Number of pixels that it affects: dark is few, bright is many", 3),
         ),
         **_SHOWN,
     )
