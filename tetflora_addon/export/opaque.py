@@ -28,7 +28,7 @@ _LIGHT = (
 #: Cells along a plant, and in how many of these its leaves do not shade themselves.
 _CELLS, _SLACK = 128, 1.5
 #: Faces of the level that is looked at: it covers what the full plant does.
-_MOST = 20_000
+_MOST = 40_000
 #: By the kind of parts (3,): how much is seen of light that falls on upper sides, and on undersides, together 1, and
 #: beside these of light from the other side of the faces that are seen.
 Sides = Mapping[str, Floats]
