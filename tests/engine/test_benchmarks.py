@@ -15,13 +15,14 @@ from devtools.readability import anchors
 
 ROOT = Path(__file__).resolve().parents[2]
 BENCHMARKS = ROOT / "benchmarks"
-#: What benchmarks share.
-SHARED = {"__init__", "__main__", "report", "pictures", "asset_trees"}
+#: What benchmarks share, and the other programs that read what is exported.
+SHARED = {"__init__", "__main__", "report", "pictures", "asset_trees", "side_views"}
+READERS = {"reimport", "export_readers", "mitsuba_views"}
 DOCUMENTS = [*sorted((ROOT / "docs").glob("*.md")), *sorted(ROOT.glob("*.md")), ROOT / "Makefile"]
 
 
 def test_every_file_is_a_benchmark_or_shared() -> None:
-    assert {path.stem for path in BENCHMARKS.glob("*.py")} == {*NAMES, *SHARED}
+    assert {path.stem for path in BENCHMARKS.glob("*.py")} == {*NAMES, *SHARED, *READERS}
 
 
 @pytest.mark.parametrize("name", NAMES)
