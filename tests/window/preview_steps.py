@@ -79,6 +79,7 @@ def preview_steps(ui, scene, settings, space):
     ui.values["through"] = space.region_3d.view_perspective
     yield from ui.picture("bare")
 
+    settings.plants = 'LIGHT'
     yield from ui.until(lambda: shapes(scene) is not None, 20, "plants")
     ui.values["plants"] = shapes(scene).plants
     yield from ui.picture("light")
@@ -176,7 +177,7 @@ def build(scene):
     camera.location = (14.0, -34.0, 7.0)
     camera.rotation_euler = (Vector((0.0, 0.0, 4.0)) - camera.location).to_track_quat('-Z', 'Y').to_euler()
     scene.render.resolution_x, scene.render.resolution_y = 320, 200
-    scene.tetflora.quality = 'DRAFT'
+    scene.tetflora.quality, scene.tetflora.preview.plants = 'DRAFT', 'NONE'
     scene.view_layers[0].update()
 
 
