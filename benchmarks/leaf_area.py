@@ -29,7 +29,7 @@ from tetflora_addon.growth.seeds import Seeds
 from tetflora_addon.species.catalog import load_species
 from tetflora_addon.species.ecology import ecology_of, one_sided
 from tetflora_addon.stands.change import Plants
-from tetflora_addon.stands.grow import GrowingStand, StandSettings
+from tetflora_addon.stands.grow import StandSettings, begun
 from tetflora_addon.stands.site import StandSite
 from tetflora_addon.stands.traits import StandSpecies, StandTraits
 
@@ -97,7 +97,7 @@ def stand_leaves(identifier: str, years: int) -> tuple[NDArray[np.float64], NDAr
     member = StandSpecies(species, ecology=anywhere)
     traits, cells = StandTraits([member]), round(SIDE / 5.0)
     site = StandSite(0.0, 0.0, SIDE / cells, np.zeros((cells, cells)))
-    stand = GrowingStand(site, [member], StandSettings(density=DENSITY, recruits=0.0, years=years, interval=0))
+    stand = begun(site, [member], StandSettings(density=DENSITY, recruits=0.0, years=years, interval=0))
     for year in range(years):
         stand.step(year)
     plants = stand.plants.take(np.flatnonzero(stand.plants.height >= 1.0))

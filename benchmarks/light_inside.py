@@ -36,7 +36,7 @@ from tetflora_addon.blender.scene.field_sizes import OFFSET, SIZE_ATTRIBUTES
 from tetflora_addon.blender.scene.fields import write_field
 from tetflora_addon.species.catalog import load_species
 from tetflora_addon.stands.change import Records
-from tetflora_addon.stands.grow import GrowingStand, StandSettings
+from tetflora_addon.stands.grow import StandSettings, begun
 from tetflora_addon.stands.site import StandSite
 from tetflora_addon.stands.traits import StandSpecies, StandTraits
 
@@ -150,7 +150,7 @@ def wood(name: str, years: int, side: float) -> tuple[Records, float, float]:
     """Plants of a grown stand around the origin, light at the height of the eye in the simulation, leaf area index."""
     member, cells = StandSpecies(load_species(name)), round(side / 4.0)
     site = StandSite(-side / 2.0, -side / 2.0, side / cells, np.zeros((cells, cells)))
-    stand = GrowingStand(site, [member], StandSettings(density=DENSITY, recruits=0.0, years=years, interval=0))
+    stand = begun(site, [member], StandSettings(density=DENSITY, recruits=0.0, years=years, interval=0))
     for year in range(years):
         stand.step(year)
     plants, traits = stand.plants, StandTraits([member])

@@ -23,7 +23,7 @@ from tetflora_addon.compiled.sizes import crown_of
 from tetflora_addon.growth.hashing import key_of_seed, uniform
 from tetflora_addon.species.ages import ages_of, with_age
 from tetflora_addon.species.catalog import load_species
-from tetflora_addon.stands.grow import GrowingStand, StandSettings
+from tetflora_addon.stands.grow import StandSettings, begun
 from tetflora_addon.stands.site import StandSite
 from tetflora_addon.stands.traits import StandSpecies, StandTraits
 
@@ -67,7 +67,7 @@ def stand(species: str) -> tuple[list[Figure], tuple[float, float]]:
     traits, settings = StandTraits([member]), StandSettings(density=DENSITY, recruits=0.0, years=max(YEARS), interval=0)
     cells = round(SIDE / 5.0)
     site = StandSite(0.0, 0.0, SIDE / cells, np.zeros((cells, cells)))
-    grown, area = GrowingStand(site, [member], settings), SIDE**2 / 1e4
+    grown, area = begun(site, [member], settings), SIDE**2 / 1e4
     found, thinned, stands = [], [], []
     for year in range(settings.years):
         grown.step(year)
@@ -126,7 +126,7 @@ def timed(plants: int) -> dict[str, float]:
     cells = max(round(side / 5.0), 1)
     site = StandSite(0.0, 0.0, side / cells, np.zeros((cells, cells)))
     start, alive = time.perf_counter(), 0
-    grown = GrowingStand(
+    grown = begun(
         site, [StandSpecies(load_species(n)) for n in _TIMED], StandSettings(density=_PLANTED, years=_TIME, interval=20)
     )
     for year in range(_TIME):
@@ -331,8 +331,9 @@ def figures(species: str, years: int, trees: Trees) -> list[Figure]:
         counted = trees.diameter[trees.diameter >= _COUNTED]
         tolerance, middle = data["diameters"]["tolerance"], spread_of_diameters(species, trees)
         add("spread of diameters", middle - tolerance, middle + tolerance, counted.std() / counted.mean())
-    low, high = data["leaf_area"]["species"].get(species, data["leaf_area"]["range"])
-    add("leaf area index", low, high, trees.leaves / (1e4 * trees.area))
+    least, most = data["leaf_area"]["range"]
+    low, high = data["leaf_area"]["species"].get(species, (least, most))
+    add("leaf area index", max(least, low), high, trees.leaves / (1e4 * trees.area))
     return found
 
 

@@ -45,7 +45,7 @@ class TETFLORA_UL_layers(bpy.types.UIList):
         right = row.row(align=True)
         right.alignment = 'RIGHT'
         right.label(text=_short(plants_in(item)), icon='FILE_REFRESH' if is_due(item) else 'NONE')
-        if item.frozen:  # what few are leaves its room to the name
+        if item.frozen:  # few layers are, and names need the room
             right.prop(item, "frozen", text="", emboss=False, icon='FREEZE')
         right.prop(item, "shown", text="", emboss=False, icon='HIDE_OFF' if item.shown else 'HIDE_ON')
 

@@ -179,9 +179,13 @@ def spread(counts: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int
     return owner, np.arange(len(owner)) - first[owner]
 
 
-def batches(counts: NDArray[np.int64], most: int) -> list[NDArray[np.int64]]:
-    """Indices of things with ``counts`` others each, so many at a time that these are about ``most``."""
-    return np.split(np.arange(len(counts)), np.flatnonzero(np.diff(np.cumsum(counts) // most)) + 1)
+def chunks(counts: NDArray, limit: float) -> Iterator[slice]:
+    """Runs of things, of which ``counts`` (n,), perhaps expected ones, sum up to about a limit each."""
+    block = (np.cumsum(counts) / limit).astype(np.int64)
+    edges = np.flatnonzero(np.diff(block)) + 1
+    for start, stop in zip([0, *edges], [*edges, len(counts)], strict=True):
+        if stop > start:
+            yield slice(int(start), int(stop))
 
 
 def connected(n: int, a: Integers, b: Integers) -> NDArray[np.int32]:

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import Arrays, Floats, Floats32, Integers, Integers32, Mask, batches, column, spread, unit
+from ..arrays import Arrays, Floats, Floats32, Integers, Integers32, Mask, chunks, column, spread, unit
 from ..buffers import MeshBuffers
 from ..growth.hashing import child_key, key_of_seed, uniform
 from .asset import AssetKites, AssetSource, SurfaceSamples
@@ -190,10 +190,10 @@ def runs_of(
     small = small[np.argsort(hierarchy.first[small], kind="stable")][first:last]
     done = np.concatenate([[0], np.cumsum(pool.triangles[hierarchy.order], dtype=np.int64)])
     load = done[hierarchy.last[small]] - done[hierarchy.first[small]]
-    for block in batches(load, BATCH):
-        own = small[block]
+    for run in chunks(load, BATCH):
+        own = small[run]
         of, index = spread(hierarchy.last[own] - hierarchy.first[own])
-        yield _run(source, pool, hierarchy.order[hierarchy.first[own][of] + index], first + block[of])
+        yield _run(source, pool, hierarchy.order[hierarchy.first[own][of] + index], first + run.start + of)
 
 
 def _run(source: AssetSource, pool: PatchTable, some: Integers, cluster: Integers) -> Run:

@@ -301,16 +301,10 @@ def wind_of(scene: bpy.types.Scene) -> Wind | None:
 
     With motion blur it is that of the middle of the exposure, from which Cycles goes back and forth by velocities. It
     does not depend on the scene's range of frames, which workers of a farm set to the frames that they render.
-
-    Raises
-    ------
-    SceneError
-        A setting is beyond its limits.
     """
     group = scene.tetflora.wind
     if not group.enabled or group.speed == 0.0:
         return None
-    check_limits(group, f'Scene "{scene.name}"')
     rate = scene.render.fps / scene.render.fps_base
     frame = scene.frame_current_final
     if group.loop:
@@ -367,11 +361,10 @@ class TetFloraYear(bpy.types.PropertyGroup):
 
 
 def season_of(scene: bpy.types.Scene) -> Season | None:
-    """The season at the scene's frame, its day within one year; None without seasons. Errors are those of `wind_of`."""
+    """The season at the scene's frame, its day within one year; None without seasons."""
     group = scene.tetflora.year
     if not group.enabled:
         return None
-    check_limits(group, f'Scene "{scene.name}"')
     return Season(group.day % DAYS, group.latitude, group.spread, group.snow)
 
 

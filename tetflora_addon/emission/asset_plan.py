@@ -17,7 +17,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import column
+from ..arrays import chunks, column
 from ..camera.camera import Camera
 from ..growth.hashing import Draw, uniform
 from ..proxies.asset_facets import facet_totals, facets_of_assets
@@ -26,7 +26,6 @@ from ..proxies.primitives import triangle_corners
 from ..refinement.decisions import explicit_fraction
 from ..refinement.loop import Refinement
 from ..refinement.shared_parts import AssetParts, PlacedAssets
-from ..subplants.pieces import chunks
 from .frontier import Canvas, FrontierKind, Shown, Waiting, Whose, opaque_fractions
 from .plants import KITES, inside_explicit
 

@@ -17,7 +17,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import Arrays, in_axes, spread
+from ..arrays import Arrays, chunks, in_axes, spread
 from ..camera.camera import Camera, circle_of_confusion
 from ..parallel import blocks
 
@@ -233,12 +233,8 @@ class Coverage:
             return
         self._maxima = None
         flat = self.depth.reshape(-1)
-        ends = np.cumsum(count[some])
-        start = 0
-        while start < len(some):
-            before = ends[start - 1] if start else 0
-            stop = max(start + 1, int(np.searchsorted(ends, before + PAIRS_BATCH, side="right")))
-            which = some[start:stop]
+        for run in chunks(count[some], PAIRS_BATCH):
+            which = some[run]
             owner, index = spread(count[which])
             t = which[owner]
             dy, dx = np.divmod(index, wide[t])
@@ -247,7 +243,6 @@ class Coverage:
             # Of small triangles the farthest corner, of large ones the depth at the pixel.
             z = np.minimum(z, far[t])[inside].astype(np.float32)
             np.minimum.at(flat, (py * self.depth.shape[1] + px - self.first)[inside], z)
-            start = stop
 
 
 def _projected(

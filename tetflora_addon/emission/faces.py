@@ -19,13 +19,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import Arrays, column, spread, unit
+from ..arrays import Arrays, chunks, column, spread, unit
 from ..camera.camera import Camera
 from ..growth.hashing import child_key, key_of_seed, mix, stepped, uniform
 from ..proxies.microsurfaces import Facets
 from ..refinement.contents import polygon_totals
 from ..refinement.polygons import Meshes, Polygons
-from ..subplants.pieces import chunks
 from .frontier import Canvas, FrontierKind, Shown, Waiting, Whose
 
 #: Least fraction of a surface that is opaque where it hides what is behind.

@@ -18,7 +18,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import Arrays
+from ..arrays import Arrays, chunks
 from ..buffers import BLOCK_POLYGONS, MeshBuffers
 from ..camera.camera import Camera
 from ..compiled.flora import Flora
@@ -34,7 +34,7 @@ from ..refinement.loop import Refinement
 from ..refinement.shared_parts import SharedParts, SharePoints, descend
 from ..species.species import LEAF_KINDS
 from ..subplants.leaf_meshes import leaf_meshes
-from ..subplants.pieces import chunks, expand
+from ..subplants.pieces import expand
 from ..subplants.tubes import tube_buffers
 from .leaf_detail import TOLERANCE, LeafDetail
 

@@ -13,12 +13,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import spread
+from ..arrays import chunks, spread
 from ..buffers import BLOCK_POLYGONS, MeshBuffers
 from ..refinement.decisions import Decision
 from ..refinement.loop import Refinement
 from ..refinement.polygons import Polygons, area_fractions
-from ..subplants.pieces import chunks
 
 #: Shapes of attributes by their number of components; a mesh cannot hold others.
 _FLOATS = {1: (), 2: (2,), 3: (3,)}

@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..arrays import Floats, Floats32, Integers, Keys, Mask, connected, in_axes, perpendicular, spiral, spread
+from ..arrays import Floats, Floats32, Integers, Keys, Mask, chunks, connected, in_axes, perpendicular, spiral, spread
 from ..buffers import MeshBuffers, concatenate_buffers
 from ..compiled.flora import Flora
 from ..growth.growth import WholeBranches, leaf_counts, trunks
@@ -23,7 +23,7 @@ from ..growth.hashing import uniform
 from ..growth.seeds import Branches, Seeds
 from ..species.species import LEAF_KINDS
 from ..subplants.leaf_meshes import leaf_meshes
-from ..subplants.pieces import chunks, expand
+from ..subplants.pieces import expand
 from ..subplants.tubes import tube_buffers, twig_buffers
 
 #: Pixels that a leaf or a twig is long, or wide, where it is not thinned.

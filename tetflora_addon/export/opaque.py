@@ -12,7 +12,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..arrays import Floats, spiral
+from ..arrays import GOLDEN_ANGLE, Floats, spiral
 from ..buffers import MeshBuffers
 from ..optics import PALER, THROUGH_TINT
 from .gltf import face_normals
@@ -32,6 +32,8 @@ _MOST = 40_000
 #: By the kind of parts (3,): how much is seen of light that falls on upper sides, and on undersides, together 1, and
 #: beside these of light from the other side of the faces that are seen.
 Sides = Mapping[str, Floats]
+#: As much of light is seen from where it falls on an upper side, and on an underside, as comes through.
+_EVEN = np.array([0.5, 0.5, 1.0])
 
 
 def opaque(levels: Sequence[PlantLevel], sides: Sides) -> tuple[PlantLevel, ...]:
@@ -46,10 +48,6 @@ def sides_of(levels: Sequence[PlantLevel]) -> Sides:
     """Which sides of leaves a plant shows."""
     level = next((level for level in levels if level.polygons <= _MOST), levels[-1])
     return dict(zip([kind for kind, _ in level.parts], _sides([mesh for _, mesh in level.parts]), strict=True))
-
-
-#: As much of light is seen from where it falls on an upper side, and on an underside, as comes through.
-_EVEN = np.array([0.5, 0.5, 1.0])
 
 
 def _recolored(mesh: MeshBuffers, sides: Floats) -> MeshBuffers:
@@ -84,4 +82,4 @@ def _sides(meshes: Sequence[MeshBuffers]) -> Floats:
 def _lamps() -> Iterator[tuple[Floats, float]]:
     """Directions (3,) to light, and the irradiance from each of what faces it."""
     for z, level in _LIGHT:
-        yield from ((toward, level / np.abs(z).sum()) for toward in spiral(z, np.arange(len(z)), 2.4))
+        yield from ((toward, level / np.abs(z).sum()) for toward in spiral(z, np.arange(len(z)), GOLDEN_ANGLE))

@@ -18,6 +18,7 @@ from functools import lru_cache
 import numpy as np
 
 from ..arrays import Arrays, Floats, Integers, Keys, Mask, Table, gathered, smoothstep
+from ..errors import TetFloraError
 from ..parameters import FACTOR, setting
 from ..species.species import DAYS, LEAF_KINDS, MAX_AUTUMN, LeafYear, Species
 from .hashing import Draw, mix_draw, signed, uniform
@@ -44,7 +45,13 @@ it is in summer; and the parts of the last that have the fresh color, those of a
 
 @dataclass(frozen=True)
 class Season:
-    """A day of the year at a place. Fields with a label are properties of a scene, and documented by their tooltips."""
+    """A day of the year at a place. Fields with a label are properties of a scene, and documented by their tooltips.
+
+    Raises
+    ------
+    TetFloraError
+        A number that is none or is out of its limits.
+    """
 
     day: float = setting(
         196.0,
@@ -77,6 +84,12 @@ class Season:
     snow: float = setting(
         0.0, "Snow", "Snow on leaves, branches and ground: 0 none, 1 on all that faces the sky", **FACTOR
     )
+
+    def __post_init__(self) -> None:
+        if not np.isfinite([self.day, self.latitude, self.spread, self.snow]).all():
+            raise TetFloraError("Seasons: Day of Year, Latitude, Spread and Snow must be finite numbers")
+        if abs(self.latitude) > 90 or self.spread < 0 or not 0 <= self.snow <= 1:
+            raise TetFloraError("Seasons: Latitude must be within 90°, Spread 0 or greater, and Snow between 0 and 1")
 
     @property
     def northern_day(self) -> float:

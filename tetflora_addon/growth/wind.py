@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays import Floats, Floats32, Integers, Keys, Table, cross, dot
+from ..errors import TetFloraError
 from ..parameters import FACTOR, setting, within
 from .hashing import Draw, uniform
 from .rows import SPUR_ORDER, with_columns
@@ -69,7 +70,13 @@ sine of leaves' turns in a wind without gusts, ``flutter_rate`` their frequency,
 
 @dataclass(frozen=True)
 class Wind:
-    """A wind at a moment. Fields with a label are properties of a scene, and documented by their tooltips."""
+    """A wind at a moment. Fields with a label are properties of a scene, and documented by their tooltips.
+
+    Raises
+    ------
+    TetFloraError
+        A number that is none, a negative speed or loop, or gusts outside 0 to 1.
+    """
 
     speed: float = setting(
         4.0,
@@ -98,6 +105,12 @@ class Wind:
     loop: float = 0.0  # seconds after which all movement repeats; 0 for never
     moving: bool = False  # whether vertices shall have velocities
     origin: tuple[float, float, float] = (0.0, 0.0, 0.0)  # where in the world positions are counted from, meters
+
+    def __post_init__(self) -> None:
+        if not np.isfinite([self.speed, self.direction, self.gusts, self.time, self.loop]).all():
+            raise TetFloraError("Wind: Speed, Direction, Gusts, Loop and the time must be finite numbers")
+        if self.speed < 0 or self.loop < 0 or not 0 <= self.gusts <= 1:
+            raise TetFloraError("Wind: Speed and Loop must be 0 or greater, and Gusts between 0 and 1")
 
     @property
     def strength(self) -> float:

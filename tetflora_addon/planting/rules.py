@@ -6,8 +6,8 @@ Rules that nothing can follow are refused, with the setting's name and what to d
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from math import degrees, floor, inf, log10, pi, radians, sqrt
+from dataclasses import dataclass, fields
+from math import degrees, floor, inf, isfinite, log10, pi, radians, sqrt
 
 import numpy as np
 
@@ -173,28 +173,74 @@ def species_by_weight(weights: tuple[float, ...], draws: Floats) -> Integers32:
     return np.minimum(np.searchsorted(limits, draws, side="right"), len(weights) - 1).astype(np.int32)
 
 
+#: Fields that have to be 0 or greater, in the order in which they are looked at.
+_NOT_NEGATIVE = (
+    "density", "min_distance", "altitude_falloff", "wetness_softness", "edge_falloff", "clumping", "scale_at_top",
+    "aspect_spread",
+)  # fmt: skip
+
+
 def check_rules(rules: Rules) -> None:
-    """Look through rules that are within the limits of each by itself.
+    """Look through all rules.
 
     Raises
     ------
     SceneError
         The first that cannot be.
     """
+    _check_numbers(rules)
     if not sum(max(weight, 0.0) for weight in rules.weights) > 0.0:
         raise SceneError("No species has a weight above 0; raise a weight in the species list")
     if rules.by_density and rules.density == 0.0:
         raise SceneError("Density must be greater than 0; raise it, or turn off By Density")
-    for name, low, high, unit in (
-        ("Slope", degrees(rules.slope_min), degrees(rules.slope_max), "°"),
-        ("Altitude", rules.altitude_min, rules.altitude_max, " m"),
-        ("Wetness", rules.wetness_min, rules.wetness_max, ""),
-    ):
-        if not low <= high:
-            raise SceneError(
-                f"Min {name} ({low:.5g}{unit}) is greater than Max {name} ({high:.5g}{unit}); lower Min {name} or "
-                f"raise Max {name}"
-            )
+    if not rules.by_density and rules.count < 1:
+        raise SceneError(f"Count must be at least 1, not {rules.count}")
+    if not rules.slope_min <= rules.slope_max:
+        raise SceneError(
+            f"Min Slope ({degrees(rules.slope_min):.3g}°) is greater than Max Slope ({degrees(rules.slope_max):.3g}°); "
+            "lower Min Slope or raise Max Slope"
+        )
+    if not rules.altitude_min <= rules.altitude_max:
+        raise SceneError(
+            f"Min Altitude ({rules.altitude_min:.5g} m) is greater than Max Altitude ({rules.altitude_max:.5g} m); "
+            "lower Min Altitude or raise Max Altitude"
+        )
+    if not 0.0 <= rules.wetness_min <= rules.wetness_max <= 1.0:
+        raise SceneError(
+            f"Min Wetness is {rules.wetness_min:.3g} and Max Wetness {rules.wetness_max:.3g}; both must be between 0 "
+            "and 1, and Min not greater than Max"
+        )
+    if not rules.clumping <= 1.0:
+        raise SceneError(f"Clumping must be between 0 and 1, not {rules.clumping:g}")
+    if rules.clumping and not rules.clump_size > 0.0:
+        raise SceneError(f"Clump Size must be greater than 0, not {rules.clump_size:g} m; or set Clumping to 0")
+    if not min(rules.scale_min, rules.scale_max) > 0.0:
+        raise SceneError(
+            f"Scale must be greater than 0, not {rules.scale_min:g} to {rules.scale_max:g}; raise Min and Max Scale"
+        )
+    for rule in rules.companions:
+        _check_companion(rule, len(rules.weights))
+
+
+def _check_numbers(rules: Rules) -> None:
+    labels = {one.name: one.metadata.get("name", "Density") for one in fields(rules)}
+    for name in _NOT_NEGATIVE:
+        value = getattr(rules, name)
+        if not isfinite(value) or value < 0.0:
+            raise SceneError(f"{labels[name]} must be 0 or greater, not {value:g}")
+
+
+def _check_companion(rule: Companion, species: int) -> None:
+    if not (0 <= rule.species < species and 0 <= rule.other < species):
+        raise SceneError(
+            f"A companion rule refers to species {rule.species + 1} and {rule.other + 1}, but the list has {species}; "
+            "choose species from the list, or remove the rule"
+        )
+    if not -1.0 <= rule.strength <= 1.0 or not rule.distance >= 0.0:
+        raise SceneError(
+            f"A companion rule has Attraction {rule.strength:g} and Reach {rule.distance:g} m; "
+            "Attraction must be between -1 and 1, and Reach 0 or greater"
+        )
 
 
 #: Distance of neighbors in crown radii: a birch forest at 3 to 4 m is closed, and light still falls between the crowns.

@@ -16,7 +16,7 @@ from hashlib import blake2b
 
 import numpy as np
 
-from ..arrays import Floats, Integers, Mask, batches, spread
+from ..arrays import Floats, Integers, Mask, chunks, spread
 from ..errors import SceneError
 
 #: Most cells of a grid, whatever its use.
@@ -102,9 +102,9 @@ def height_grid(triangles: Floats, cell: float) -> HeightGrid:
     lowest = np.clip(np.ceil(corners[..., 1].min(axis=1) - _HAIR), 0, rows - 1).astype(np.int64)
     highest = np.clip(np.floor(corners[..., 1].max(axis=1) + _HAIR), -1, rows - 1).astype(np.int64)
     number = np.maximum(highest - lowest + 1, 0)
-    for some in batches(number, _ENTRIES):
-        owner, offset = spread(number[some])
-        own = some[owner]
+    for run in chunks(number, _ENTRIES):
+        owner, offset = spread(number[run])
+        own = run.start + owner
         _draw(corners, slope, own, lowest[own] + offset, columns, top)
     height = np.where(np.isneginf(top), np.nan, top).reshape(rows, columns)
     return HeightGrid(west, south, cell, height)
@@ -143,9 +143,9 @@ def _draw(corners: Floats, slope: Floats, own: Integers, row: Integers, columns:
     first = np.clip(np.ceil(left - _HAIR), 0, columns).astype(np.int64)
     last = np.clip(np.floor(right + _HAIR), -1, columns - 1).astype(np.int64)
     number = np.maximum(last - first + 1, 0)
-    for some in batches(number, _ENTRIES):
-        owner, offset = spread(number[some])
-        span = some[owner]
+    for run in chunks(number, _ENTRIES):
+        owner, offset = spread(number[run])
+        span = run.start + owner
         column, mine = first[span] + offset, own[span]
         corner = corners[mine, 0]
         height = corner[:, 2] + slope[mine, 0] * (column - corner[:, 0]) + slope[mine, 1] * (row[span] - corner[:, 1])

@@ -19,7 +19,7 @@ from typing import Generic, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import Arrays, Chunks, Floats, Integers, Integers32, Mask, column, nested
+from ..arrays import Arrays, Chunks, Floats, Integers, Integers32, Mask, chunks, column, nested
 from ..camera.camera import Camera
 from ..compiled.flora import Flora
 from ..compiled.placed import bounds, extents
@@ -27,7 +27,7 @@ from ..growth.foliage import are_solids, envelope_reach
 from ..growth.growth import fullness
 from ..growth.seasons import AREA, PRESENT
 from ..growth.seeds import Branches
-from ..subplants.pieces import Pieces, chunks, leaf_fraction, piece_leaf_integrals, wood_areas
+from ..subplants.pieces import Pieces, leaf_fraction, piece_leaf_integrals, wood_areas
 from ..tetrahedra.tree import TetrahedralTree
 from .polygons import Polygons, area_fractions
 

@@ -18,8 +18,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import Arrays, Floats, Floats32, Integers, Integers32, Mask, spread
-from ..subplants.pieces import chunks
+from ..arrays import Arrays, Floats, Floats32, Integers, Integers32, Mask, chunks, spread
 
 #: Triangles that are measured at a time; bounds what that takes to some hundred megabytes.
 MEASURE_BATCH = 200_000

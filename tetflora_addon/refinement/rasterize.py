@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..arrays import Arrays, Floats, Integers, Integers32, batches, column, spread
+from ..arrays import Arrays, Floats, Integers, Integers32, chunks, column, spread
 from ..camera.camera import Camera, silhouette_area, window_bounds
 from ..parallel import blocks
 from ..tetrahedra.geometry import face_area_vectors, projected_area, volume
@@ -188,7 +188,7 @@ def _rows(box: Integers, which: Integers) -> Iterator[_Rows]:
     wide, high = (np.maximum(box[which, i + 1] - box[which, i] + 1, 0) for i in (0, 2))
     kept = np.flatnonzero(wide * high)
     which, wide, high = which[kept], wide[kept], high[kept]
-    for run in batches(wide * high, PAIR_BATCH):
+    for run in chunks(wide * high, PAIR_BATCH):
         owner, number = spread(high[run])
         cell = which[run][owner]
         if len(cell):

@@ -76,13 +76,33 @@ def grow(
     Raises
     ------
     TetFloraError
-        Nothing can grow, or the ground is too large; names the setting.
+        A setting cannot be, or the ground is too large; names it.
     """
-    stand = GrowingStand(site, species, settings)
+    stand = begun(site, species, settings)
     for year in range(settings.years):
         yield Progress(year / settings.years, f"Growing the stand: year {year} of {settings.years}")
         stand.step(year)
     return stand.finished()
+
+
+def begun(site: StandSite, species: Sequence[StandSpecies], settings: StandSettings) -> GrowingStand:
+    """A stand at its beginning, which whoever has it steps from year to year; see `grow`."""
+    _check(settings)
+    return GrowingStand(site, StandTraits(species), settings)
+
+
+def _check(settings: StandSettings) -> None:
+    for name, value, low, high in (
+        ("Years", settings.years, 1, 2000),
+        ("Interval", settings.interval, 0, 2000),
+        ("Planted", settings.density, 0, 1e7),
+        ("Seedlings", settings.recruits, 0, 1e6),
+        ("Incoming Seeds", settings.outside, 0, 1e6),
+        ("Min Height", settings.min_height, 0, 200),
+        ("Cell", settings.cell, 0.05, 50),
+    ):
+        if not low <= value <= high:  # false for NaN as well
+            raise TetFloraError(f"{name} of a stand must be from {low:g} to {high:g}, not {value:g}")
 
 
 class GrowingStand:
@@ -95,9 +115,8 @@ class GrowingStand:
     dead : DeadPlants
     """
 
-    def __init__(self, site: StandSite, species: Sequence[StandSpecies], settings: StandSettings) -> None:
-        self.site, self.settings = site, settings
-        self.traits = traits = StandTraits(species)
+    def __init__(self, site: StandSite, traits: StandTraits, settings: StandSettings) -> None:
+        self.site, self.traits, self.settings = site, traits, settings
         width, depth = site.size
         margin = _MARGIN if settings.open_edges else 0.0
         rows, columns = (max(round((size + 2.0 * margin) / settings.cell), 3) for size in (depth, width))

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..arrays import Floats, Integers, bilinear
+from ..errors import TetFloraError
 from ..species.species import Ecology
 
 #: Kelvin by which it is colder for each meter of altitude, and degree days that a kelvin is worth: days of the season.
@@ -42,10 +43,30 @@ class StandSite:
     altitude: float = 0.0
 
     def __post_init__(self) -> None:
-        for name in ("plantable", "moisture", "fertility"):
+        """Refuse what is no site.
+
+        Raises
+        ------
+        TetFloraError
+            Names what is wrong.
+        """
+        if not self.cell > 0.0:
+            raise TetFloraError(f"The cells of a site must be larger than 0 m, not {self.cell:g} m")
+        if np.ndim(self.height) != 2 or not np.size(self.height):
+            raise TetFloraError("The ground of a site must have rows and columns; choose a ground with some area")
+        for name in ("height", "plantable", "moisture", "fertility"):
             value = getattr(self, name)
-            if value is not None:
-                object.__setattr__(self, name, np.clip(np.asarray(value, np.float64), 0.0, 1.0))
+            if value is None:
+                continue
+            value = np.asarray(value, np.float64)
+            if value.shape != np.shape(self.height):
+                raise TetFloraError(f"A site's {name} has {value.shape} cells, its height {np.shape(self.height)}")
+            if not np.isfinite(value).all():
+                raise TetFloraError(f"A site's {name} is not a number in some cells")
+            object.__setattr__(self, name, value if name == "height" else np.clip(value, 0.0, 1.0))
+        for name, low, high in (("degree_days", 0.0, 12000.0), ("coldest_month", -80.0, 40.0)):
+            if not low <= getattr(self, name) <= high:
+                raise TetFloraError(f"A site's {name} must be from {low:g} to {high:g}, not {getattr(self, name):g}")
 
     @property
     def size(self) -> tuple[float, float]:

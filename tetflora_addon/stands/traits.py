@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays import Floats
+from ..errors import TetFloraError
 from ..species.ages import ages_of
 from ..species.ecology import ecology_of
 from ..species.species import Ecology, Species
@@ -58,6 +59,13 @@ class StandTraits:
     """
 
     def __init__(self, species: Sequence[StandSpecies]) -> None:
+        if not species:
+            raise TetFloraError("A stand needs at least one species; add one to the list")
+        if not all(
+            np.isfinite(one.planted) and np.isfinite(one.incoming_seeds) and min(one.planted, one.incoming_seeds) >= 0
+            for one in species
+        ):
+            raise TetFloraError("Shares of species must be 0 or greater")
         self.needs = [one.needs for one in species]
         for name in (one for one in Ecology.__dataclass_fields__ if one != "source"):
             setattr(self, name, np.array([getattr(one, name) for one in self.needs]))

@@ -16,7 +16,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import Floats, Floats32, Integers, Integers32, Keys, gathered, spread
+from ..arrays import Floats, Floats32, Integers, Integers32, Keys, chunks, gathered, spread
 from ..buffers import MeshBuffers
 from ..compiled.flora import Flora
 from ..growth.foliage import (
@@ -38,7 +38,7 @@ from ..growth.wind import moment
 from ..leaves.kites import KITE, LeafKites, leaf_kites, leaf_planes
 from ..leaves.levels import LeafLevel, chosen_level, hidden_gloss, leaf_levels
 from ..leaves.models import LeafModel
-from .pieces import Thin, chunks
+from .pieces import Thin
 
 _ROW_BATCH = 4096
 

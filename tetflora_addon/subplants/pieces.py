@@ -120,12 +120,3 @@ def expand(flora: Flora, subplants: Branches) -> Iterator[WholeBranches]:
     while len(subplants):
         whole, _, subplants, _ = open_branches(flora.rows, subplants)
         yield whole
-
-
-def chunks(polygons: Floats, limit: float) -> Iterator[slice]:
-    """Runs of things whose expected polygons (n,) sum up to about a limit each."""
-    block = (np.cumsum(polygons) / limit).astype(np.int64)
-    edges = np.flatnonzero(np.diff(block)) + 1
-    for start, stop in zip([0, *edges], [*edges, len(polygons)], strict=True):
-        if stop > start:
-            yield slice(int(start), int(stop))

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import Floats, Floats32, Integers, Integers32, spread, unit
+from ..arrays import Floats, Floats32, Integers, Integers32, chunks, spread, unit
 from ..buffers import MeshBuffers, concatenate_buffers
 from ..compiled.flora import Flora
 from ..growth.axes import Axes
@@ -24,7 +24,7 @@ from ..growth.hashing import Draw, uniform
 from ..growth.seasons import branch_colors
 from ..growth.seeds import Branches
 from ..growth.wind import moment
-from .pieces import Pieces, chunks, wood_areas
+from .pieces import Pieces, wood_areas
 from .rings import (
     BUD_RINGS,
     PLACES,

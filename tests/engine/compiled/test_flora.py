@@ -10,11 +10,12 @@ import numpy as np
 import pytest
 
 from tests.engine import support
+from tetflora_addon.arrays import chunks
 from tetflora_addon.compiled.orientation import leaf_moments, wood_moments
 from tetflora_addon.compiled.samples import Points
 from tetflora_addon.growth.seeds import Branches
 from tetflora_addon.refinement.contents import subplant_totals
-from tetflora_addon.subplants.pieces import chunks, open_subplants, wood_areas
+from tetflora_addon.subplants.pieces import open_subplants, wood_areas
 
 
 def samples_of_plants(species: int, count: int) -> dict[str, np.ndarray]:

@@ -19,14 +19,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tests.engine import support
-from tetflora_addon.arrays import spread
+from tetflora_addon.arrays import chunks, spread
 from tetflora_addon.compiled.flora import Flora
 from tetflora_addon.growth.axes import axes
 from tetflora_addon.growth.foliage import face_light, leaf_keys, leaf_places, place_leaves
 from tetflora_addon.growth.growth import branch_counts, children, chosen_children, leaf_counts, trunks
 from tetflora_addon.growth.rows import DEAD, FORK, SPUR
 from tetflora_addon.growth.seeds import Branches, Seeds
-from tetflora_addon.subplants.pieces import Pieces, chunks, open_subplants
+from tetflora_addon.subplants.pieces import Pieces, open_subplants
 
 TABLE = Path(__file__).resolve().parents[2] / "data" / "plants.json"
 seeds_ = st.integers(-(2**63), 2**63 - 1)

@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 
 from tests.engine import support
 from tetflora_addon.compiled.flora import Flora, compile_species
+from tetflora_addon.errors import TetFloraError
 from tetflora_addon.growth.hashing import key_of_seed
 from tetflora_addon.growth.seasons import (
     AREA,
@@ -209,6 +210,12 @@ def test_hues_of_plants_mix_the_colors_of_autumn_as_expected() -> None:
         trunk = support.trunks(rows, support.plants(0))
         year = np.array([[270.0, hue]])
         np.testing.assert_allclose(mean, flora.leaf_colors(replace(trunk, year=year))[0], atol=0.01)
+
+
+@pytest.mark.parametrize("wrong", [{"day": np.nan}, {"latitude": 91.0}, {"spread": -1.0}, {"snow": 2.0}])
+def test_a_season_that_is_none_is_refused(wrong: dict) -> None:
+    with pytest.raises(TetFloraError, match="Seasons"):
+        Season(**wrong)
 
 
 def test_presence_of_evergreens_stays_high() -> None:

@@ -18,6 +18,7 @@ from tests.engine.growth.test_drawn import flora as drawn_flora
 from tetflora_addon.arrays import spread
 from tetflora_addon.buffers import MeshBuffers
 from tetflora_addon.compiled.flora import Flora
+from tetflora_addon.errors import TetFloraError
 from tetflora_addon.growth.axes import axes
 from tetflora_addon.growth.foliage import leaf_keys, leaf_places, place_leaves, settled
 from tetflora_addon.growth.growth import WholeBranches, leaf_counts
@@ -319,6 +320,14 @@ def test_an_upright_line_leans_to_an_arc_of_its_length(height: float) -> None:
     arc = leaned(line[None], np.array([[0.0, 0.0, 1.0]]), np.array([[0.0, 0.1, 0.0]]))[0]
     assert np.linalg.norm(np.diff(arc, axis=0), axis=1).sum() == pytest.approx(height, rel=1e-5)
     assert arc[-1, 0] == pytest.approx((1 - np.cos(0.1 * height)) / 0.1)  # to +x, about +y
+
+
+@pytest.mark.parametrize(
+    "wrong", [{"speed": -1.0}, {"speed": np.nan}, {"gusts": 1.5}, {"gusts": -0.1}, {"loop": -1.0}, {"time": np.inf}]
+)
+def test_what_is_no_wind_is_refused(wrong: dict) -> None:
+    with pytest.raises(TetFloraError, match="Wind"):
+        Wind(**{"speed": 1.0, **wrong})
 
 
 def test_a_gust_is_where_it_is_in_the_world_wherever_coordinates_begin() -> None:

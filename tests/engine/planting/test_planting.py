@@ -330,8 +330,13 @@ def test_small_areas_on_large_ground_are_filled():
         (dict(slope_max=0.0), r"flatter than Max Slope \(0°\)"),
         (dict(slope_min=1.55), "slope between 89° and 90°"),
         (dict(aspect_spread=0.0, aspect=0.123), "No slope faces within 0° of 7°"),
+        (dict(count=0), "Count must be at least 1, not 0"),
         (dict(by_density=True, density=0.0), "Density must be greater than 0"),
+        (dict(min_distance=float("nan")), "Min Distance must be 0 or greater, not nan"),
         (dict(by_density=True, density=1e9), "Lower the density"),
+        (dict(clumping=1.0, clump_size=0.0), "Clump Size must be greater than 0, not 0 m"),
+        (dict(companions=(Companion(0, 7, 1.0, 1.0),)), "refers to species 1 and 8, but the list has 1"),
+        (dict(scale_min=0.0), "Scale must be greater than 0"),
     ],
 )
 def test_rules_that_cannot_be_are_refused_by_name(changes, says):

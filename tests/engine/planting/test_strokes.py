@@ -181,6 +181,6 @@ def test_dabs_follow_the_mouse():
     assert len(strokes.dabs_along((0, 0, 0), (1e6, 0, 0), 0.1)) == 64
 
 
-def test_a_wide_and_dense_brush_has_too_many_cells():
-    assert strokes.too_many(Brush(radius=500.0, density=10.0))
-    assert not strokes.too_many(Brush(radius=500.0, density=0.01))
+def test_a_brush_for_which_the_map_has_too_many_cells_is_refused():
+    with pytest.raises(ValueError, match="cells"):
+        strokes.paint(Brush(radius=500.0, density=10.0), (0, 0), NONE, strokes.stroke_key(0, 0), 0)

@@ -18,7 +18,7 @@ from tetflora_addon.jobs import run_to_end
 from tetflora_addon.species.catalog import load_species
 from tetflora_addon.species.species import Ecology
 from tetflora_addon.stands.change import LYING, Records, grown, planted
-from tetflora_addon.stands.grow import GrowingStand, StandSettings, grow
+from tetflora_addon.stands.grow import StandSettings, begun, grow
 from tetflora_addon.stands.light import Crowns, LightGrid
 from tetflora_addon.stands.site import StandSite
 from tetflora_addon.stands.traits import StandSpecies, StandTraits
@@ -169,7 +169,7 @@ def test_a_year_between_two_records_lies_between_them() -> None:
 
 
 def test_dense_stands_thin_themselves() -> None:
-    stand = GrowingStand(even_site(60.0), MIXED[:1], StandSettings(years=70, interval=0, density=8000.0, recruits=0.0))
+    stand = begun(even_site(60.0), MIXED[:1], StandSettings(years=70, interval=0, density=8000.0, recruits=0.0))
     traits, thinned = stand.traits, []
     for year in range(70):
         stand.step(year)
@@ -184,6 +184,10 @@ def test_dense_stands_thin_themselves() -> None:
 @pytest.mark.parametrize(
     ("changes", "words"),
     [
+        ({"years": 0}, "Years"),
+        ({"density": np.nan}, "Planted"),
+        ({"cell": 0.0}, "Cell"),
+        ({"density": 1e6}, "Planted"),
         ({"density": 0.0, "recruits": 0.0}, "Nothing is planted"),
     ],
 )
@@ -192,7 +196,9 @@ def test_what_cannot_be_is_refused(changes: dict[str, float], words: str) -> Non
         run_to_end(grow(even_site(500.0), MIXED, replace(YEARS, **changes)))
 
 
-def test_climates_in_which_nothing_grows_are_refused() -> None:
+def test_sites_that_cannot_be_are_refused() -> None:
+    with pytest.raises(TetFloraError, match="moisture"):
+        StandSite(0, 0, 1.0, np.zeros((3, 3)), moisture=np.zeros((2, 3)))
     with pytest.raises(TetFloraError, match="climate"):
         run_to_end(grow(even_site(20.0, coldest_month=-40.0), MIXED[:1], YEARS))
 

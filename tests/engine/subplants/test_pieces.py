@@ -11,8 +11,9 @@ from hypothesis import strategies as st
 
 from tests.engine import support
 from tests.engine.growth.test_drawn import flora as drawn_flora
+from tetflora_addon.arrays import chunks
 from tetflora_addon.growth.growth import open_branches, trunks
-from tetflora_addon.subplants.pieces import chunks, leaf_fraction, open_subplants, whole_pieces
+from tetflora_addon.subplants.pieces import leaf_fraction, open_subplants, whole_pieces
 
 
 @pytest.mark.parametrize("kind", ["rich", "drawn"])
