@@ -26,10 +26,10 @@ BYTES_PER_POLYGON = 610
 #: The same of a triangle of expanded plants, whose leaves have many corners: 310 to 380 in Blender and Cycles together.
 BYTES_PER_TRIANGLE = 380
 #: Polygons and facets for each pixel that plants cover, about, with facets of a pixel.
-A_PIXEL = 6.0
+A_PIXEL = 12.0
 #: Polygons and facets that are never too many with the facets of *Final*, see `relative_side`; and how many times finer
 #: facets are at most.
-NEVER_TOO_MANY, FINEST = 1_200_000.0, 3.0
+NEVER_TOO_MANY, FINEST = 2_400_000.0, 3.0
 #: What an expected number may be off by.
 RESERVE = 0.15
 #: Leaves of what is instanced are real from widths so many times smaller on than those of plants.

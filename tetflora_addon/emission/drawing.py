@@ -71,11 +71,11 @@ FALLEN = 8.0
 _BESIDE, _THROWN = (0.1, 8.0, 15.0), (0.02, 1.0)
 #: Parts outside that are drawn at a time.
 _OUTSIDE_BATCH = 20_000
-#: Fraction of what a tile may have from which on all that is left counts as hidden.
-_FULL = 0.85
-#: Facets are so many times as large when a tile that was full too soon is drawn again, so many times at most: what is
-#: left out behind a tile that is full are holes, through which the sky is seen.
-_COARSER, _TRIES = 1.2, 12
+#: Fraction of what a tile may have from which on all that is left counts as hidden, and part of that from which on the
+#: rest is the coarser the less is left. It lies behind what is drawn already, and is seen through its gaps.
+_FULL, _SPARE = 0.85, 0.75
+#: Least part of that which counts as left: facets have 15 times the side then.
+_LEAST_LEFT = 0.001
 #: Part of what a tile may have that is made between two depths, at most.
 _SLAB = 0.06
 #: Part of all that may be drawn which plants out of view have.
@@ -221,12 +221,7 @@ def _drawn_tile(
     if columns is None:
         tile.draw_outside(parts, share)
         return tile.made(number)
-    image = (columns[1] - columns[0]) / tile.coverage.width
-    for left in reversed(range(_TRIES)):
-        if tile.draw(parts, image, share * given.most, left > 0) or not left:
-            break
-        given = replace(given, facet=_COARSER * given.facet, kinds=[kind.coarser(_COARSER) for kind in given.kinds])
-        tile = _Tile(given, columns)
+    tile.draw(parts, (columns[1] - columns[0]) / tile.coverage.width, share * given.most)
     return tile.made(number)
 
 
@@ -263,31 +258,30 @@ class _Tile:
         ]
         return [*blocks, *facets, *self.frontier.shown]
 
-    def draw(self, parts: Sequence[Arrays], share: float, most: float, may_stop: bool = False) -> bool:
-        """All parts of a tile, a share of the image, with no more than so many polygons and facets.
-
-        Returns whether there was room for all that is seen; if not, it may stop at once.
-        """
+    def draw(self, parts: Sequence[Arrays], share: float, most: float) -> None:
+        """All parts of a tile, a share of the image, with no more than so many polygons and facets."""
         given, frontier = self.given, self.frontier
         if len(given.occluders):
             self.add_shown(given.occluders)
-        full = False
         for slabs in frontier.slabs(parts, _SLAB * most):
-            full |= self.number > _FULL * most
-            if full and may_stop:
-                return False
-            for number, (kind, slab) in enumerate(zip(given.kinds, slabs, strict=True)):
-                if full:
+            times = self._coarser(most)
+            frontier.coarsen(times * given.facet, [kind.coarser(times) for kind in given.kinds])
+            for number, (kind, slab) in enumerate(zip(frontier.kinds, slabs, strict=True)):
+                if self.number > _FULL * most:
                     frontier.hidden[number].append(slab)
                 elif len(slab):
-                    side = kind.larger * given.facet * given.camera.extent_around(slab.center)
+                    side = kind.larger * frontier.facet * given.camera.extent_around(slab.center)
                     kind.draw(self, slab, side, frontier.shown)
             self._cover()
         self._draw_hidden(list(map(Waiting.concatenate, frontier.hidden)), self._few(HIDDEN_A_PIXEL, share, most))
         # What is outside of a tile's own image was part of something inside: it lies near the border.
         self._draw_outside(list(map(Waiting.concatenate, frontier.outside)), share, most)
         self._leave_out(self.number - most)
-        return not full
+
+    def _coarser(self, most: float) -> float:
+        """Sides over those that are asked for: what is left of so many has to do for all that follows."""
+        left = max(1.0 - self.number / (_FULL * most), _LEAST_LEFT)
+        return float(np.sqrt(max((1.0 - _SPARE) / left, 1.0)))
 
     def _leave_out(self, number: float) -> None:
         """Leave out so many things, should there be more than allowed.

@@ -163,6 +163,10 @@ class Frontier:
         self.outside: list[list[Waiting]] = [[] for _ in kinds]
         self.shown: list[Shown] = []
 
+    def coarsen(self, facet: float, kinds: Sequence[FrontierKind]) -> None:
+        """Go on with facets of another side, pixels, and with kinds that draw less as it is."""
+        self.facet, self.kinds = facet, kinds
+
     def pool(self, kind: FrontierKind, parts: Arrays) -> Waiting:
         """Parts (n,) of a kind with spheres around them."""
         center, radius = kind.spheres(parts)

@@ -275,14 +275,21 @@ def test_a_budget_holds(share: float) -> None:
     assert 0.5 * most < number_of(most) <= most
 
 
-def test_a_tile_that_never_fits_is_drawn_as_far_as_it_does(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_tile_that_never_fits_is_drawn_as_far_as_it_does() -> None:
     """Rather a part of it than nothing."""
-    monkeypatch.setenv("TETFLORA_THREADS", "1")  # other processes try as often as ever
-    monkeypatch.setattr(subject, "_TRIES", 1)
     flora, _, camera, result = wood()
     most = number_of() // 20
     blocks, facets, _ = support.drawn(flora, result, camera, 0.5, 0.25, most=most)
     assert 0.5 * most < sum(b.buffers.polygons for b in blocks) + len(facets) <= most
+
+
+def test_what_is_drawn_last_is_coarser_where_more_is_needed_than_expected() -> None:
+    """A tile that needs half as much again as it has is drawn once, without holes."""
+    flora, _, camera, result = wood()
+    most = number_of() / 1.5
+    pictures = [support.drawn(flora, result, camera, 1.2, 0.6, most=limit) for limit in (np.inf, most)]
+    whole, limited = (np.isfinite(coverage_of(*picture, camera).depth).mean() for picture in pictures)
+    assert limited == pytest.approx(whole, rel=0.01)
 
 
 def test_less_memory_is_coarser_everywhere() -> None:
