@@ -165,8 +165,11 @@ def drawn_blocks(given: Drawing) -> Iterator[Block | Parts | Shown]:
             some = [other.take(slice(0)) for other in outside]
             some[kind] = own.take(slice(start, start + _OUTSIDE_BATCH))
             items.append((len(tiles), None, some, len(some[kind]) / sum(map(len, outside))))
+    del tiles, outside
     whole = max(len(items), 1)
-    for number, made in enumerate(in_processes(_drawn_tile, given, items)):
+    # What was sent is let go: the parts of all tiles are a fifth of what is there before anything is made of them.
+    given_away = (items.pop(0) for _ in range(len(items)))
+    for number, made in enumerate(in_processes(_drawn_tile, given, given_away)):
         while made:
             one = made.pop(0)
             yield replace(one, fraction=(number + 1) / whole) if isinstance(one, Block) else one
@@ -240,21 +243,24 @@ class _Tile:
         self.number = 0.0
 
     def made(self, number: int) -> list[Block | Parts | Shown]:
-        """Meshes by kind, facets by whose they are, and what is drawn as it is."""
+        """Meshes by kind, facets by whose they are, and what is drawn as it is; the tile lets go of each."""
         blocks = [
-            Block(kind, form, species, number, whole, 1.0)
-            for (kind, form, species), some in sorted(self._meshes.items())
-            if (whole := concatenate_buffers(some)) is not None
+            Block(*what, number, whole, 1.0)
+            for what in sorted(self._meshes)
+            if (whole := concatenate_buffers(self._meshes.pop(what))) is not None
         ]
+        owners = sorted({one for one, _ in self._facets}, key=lambda one: (one[0] is None, one[0] or 0, one[1]))
         facets = [
             Parts(
                 whose[0],
                 tuple(
-                    (joined(self._facets[whose, seen]), seen) for seen in (True, False) if (whose, seen) in self._facets
+                    (joined(self._facets.pop((whose, seen))), seen)
+                    for seen in (True, False)
+                    if (whose, seen) in self._facets
                 ),
                 whose[1],
             )
-            for whose in sorted({one for one, _ in self._facets}, key=lambda one: (one[0] is None, one[0] or 0, one[1]))
+            for whose in owners
         ]
         return [*blocks, *facets, *self.frontier.shown]
 
