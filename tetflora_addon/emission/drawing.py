@@ -75,8 +75,8 @@ _OUTSIDE_BATCH = 20_000
 #: Fraction of what a tile may have from which on all that is left counts as hidden, and part of that from which on the
 #: rest is the coarser the less is left. It lies behind what is drawn already, and is seen through its gaps.
 _FULL, _SPARE = 0.85, 0.75
-#: Least part of that which counts as left: facets have 15 times the side then.
-_LEAST_LEFT = 0.001
+#: Least part of that which counts as left: facets have seven times the side then.
+_LEAST_LEFT = 0.005
 #: Part of what a tile may have that is made between two depths, at most.
 _SLAB = 0.06
 #: Part of all that may be drawn which plants out of view have.
@@ -92,12 +92,14 @@ FacetConverter = Callable[[Facets, bool], Any]
 class Parts:
     """Facets of one species, of assets (`ASSETS`), or of other meshes where that is None; and whether they are seen.
 
-    ``look`` is that of assets and of the surfaces of other meshes.
+    ``look`` is that of assets and of the surfaces of other meshes. ``coarser`` are sides of what is seen over those of
+    the drawing, where more was needed than there was room for.
     """
 
     species: int | None
     facets: tuple[tuple[Primitive, bool], ...]
     look: str = ""
+    coarser: float = 1.0
 
     def __iter__(self) -> Iterator[tuple[Primitive, bool]]:
         return iter(self.facets)
@@ -239,6 +241,8 @@ class _Tile:
         # What was made between two depths: whose facets, or kinds and meshes, and their corners.
         self._waiting: list[tuple[Any, Any, NDArray[np.float32]]] = []
         self.number = 0.0
+        self._drawn = 0.0  # those of what is seen
+        self._asked = 0.0  # polygons and facets that there would be with sides as they are asked for
 
     def made(self, number: int) -> list[Block | Parts | Shown]:
         """Meshes by kind, facets by whose they are, and what is drawn as it is; the tile lets go of each."""
@@ -247,6 +251,7 @@ class _Tile:
             for what in sorted(self._meshes)
             if (whole := concatenate_buffers(self._meshes.pop(what))) is not None
         ]
+        coarser = float(np.sqrt(max(self._asked / max(self._drawn, 1.0), 1.0)))
         owners = sorted({one for one, _ in self._facets}, key=lambda one: (one[0] is None, one[0] or 0, one[1]))
         facets = [
             Parts(
@@ -257,6 +262,7 @@ class _Tile:
                     if (whose, seen) in self._facets
                 ),
                 whose[1],
+                coarser,
             )
             for whose in owners
         ]
@@ -268,7 +274,7 @@ class _Tile:
         if len(given.occluders):
             self.add_shown(given.occluders)
         for slabs in frontier.slabs(parts, _SLAB * most):
-            times = self._coarser(most)
+            times, before = self._coarser(most), self.number
             frontier.coarsen(times * given.facet, [kind.coarser(times) for kind in given.kinds])
             for number, (kind, slab) in enumerate(zip(frontier.kinds, slabs, strict=True)):
                 if self.number > _FULL * most:
@@ -277,6 +283,8 @@ class _Tile:
                     side = kind.larger * frontier.facet * given.camera.extent_around(slab.center)
                     kind.draw(self, slab, side, frontier.shown)
             self._cover()
+            self._asked += times**2 * (self.number - before)
+        self._drawn = self.number
         self._draw_hidden(list(map(Waiting.concatenate, frontier.hidden)), self._few(HIDDEN_A_PIXEL, share, most))
         # What is outside of a tile's own image was part of something inside: it lies near the border.
         self._draw_outside(list(map(Waiting.concatenate, frontier.outside)), share, most)

@@ -54,11 +54,16 @@ class EmissionInput:
     disc: float = np.pi  # area that the renderer draws of a sphere of radius 1
     _waiting: list[Parts] = field(default_factory=list, compare=False)
     _shown: list[Shown] = field(default_factory=list, compare=False)
+    # Of what was made: how many facets are seen, and the sum of their areas over those that the drawing asks for.
+    _seen: list[tuple[int, float]] = field(default_factory=list, compare=False)
 
     @property
     def facet_pixels(self) -> float | None:
-        """Side in pixels of facets that are seen; None in forms that have none."""
-        return None if self.drawing is None else self.drawing.facet
+        """Side in pixels of facets that are seen, as it came out, after `mesh_blocks`; None in forms without facets."""
+        if self.drawing is None:
+            return None
+        number, area = map(sum, zip((0, 0.0), *self._seen, strict=True))
+        return self.drawing.facet * float(np.sqrt(area / number if number else 1.0))
 
     def mesh_blocks(self) -> Iterator[Block]:
         """Meshes of plants. Facets are made with them, and wait until `facet_parts` is asked for them.
@@ -70,11 +75,15 @@ class EmissionInput:
             return
         self._waiting.clear()
         self._shown.clear()
+        self._seen.clear()
         for made in drawn_blocks(self.drawing):
             if isinstance(made, Block):
                 yield made
+            elif isinstance(made, Parts):
+                self._waiting.append(made)
+                self._seen.extend((len(facets), made.coarser**2 * len(facets)) for facets, seen in made if seen)
             else:
-                (self._waiting if isinstance(made, Parts) else self._shown).append(made)
+                self._shown.append(made)
 
     def polygon_blocks(self) -> Iterator[PolygonBlock]:
         """Polygons of your own meshes that stay, after `mesh_blocks`."""

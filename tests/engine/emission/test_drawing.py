@@ -292,6 +292,22 @@ def test_what_is_drawn_last_is_coarser_where_more_is_needed_than_expected() -> N
     assert limited == pytest.approx(whole, rel=0.01)
 
 
+def test_sides_that_are_told_are_those_that_are_drawn() -> None:
+    """Where more is needed than was expected, the report does not say what was asked for."""
+    flora, _, camera, result = wood()
+    told, drawn, most = [], [], np.inf
+    for share in (0.9, 1.0):
+        given = support.refined(flora, result, camera, 1.2, 0.6, most=most)
+        polygons = sum(block.buffers.polygons for block in given.mesh_blocks())
+        told.append(given.facet_pixels)
+        facets = [made for parts in given.facet_parts() for made in parts]
+        most = share * (polygons + sum(len(some) for some, _ in facets))
+        seen = [pixels_of(some, camera) for some, is_seen in facets if is_seen]
+        drawn.append(np.sqrt((np.concatenate(seen) ** 2).mean()))
+    assert told[0] == pytest.approx(1.2)
+    assert told[1] / told[0] == pytest.approx(drawn[1] / drawn[0], rel=0.15) and told[1] > 1.25
+
+
 def test_less_memory_is_coarser_everywhere() -> None:
     """Error grows evenly: facets grow with the root of what is missing."""
     _, _, camera, result = wood()
