@@ -282,7 +282,7 @@ def fine_rings(flora: Flora, whole: WholeBranches, fine: Fineness, counts: Integ
     deep, narrow = depths(footed[base], -index[below])
     deep *= fine.weight[base] * np.where(footed[base], branches.radius[base], radius[below])
     t[below] = -deep / np.maximum(branches.length[base], _SHORTEST)
-    # As much narrower as deep: where there is little of a ball, a flat end would turn the normals of the wood before it.
+    # As much narrower as deep: where there is little of a ball, a flat end would turn normals of the wood before it.
     light[below] *= (1.0 + fine.weight[base] * (narrow - 1.0)).astype(np.float32)
     down = (below * t * branches.length[owner])[:, None] * branches.frame[owner, :, 2]
     last = owner[above]
