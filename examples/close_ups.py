@@ -242,11 +242,11 @@ def render(
     set_format(scene.render.image_settings, 'PNG')
     scene.render.filepath = str(path)
     bpy.ops.render.render(write_still=True)
-    scene.view_settings.exposure += _metered(path, gray)
+    scene.view_settings.exposure += metered(path, gray)
     bpy.data.images["Render Result"].save_render(str(path), scene=scene)
 
 
-def _metered(path: Path, gray: float) -> float:
+def metered(path: Path, gray: float) -> float:
     """Stops by which a picture is too dark, as a camera meters: views in shade are longer exposed than in the sun."""
     from PIL import Image
 

@@ -6,7 +6,7 @@
     python -m examples.grown --out out/grown.jpg --width 480 --samples 16
 
 Birches, aspens and pines come first; oaks, ashes, maples and beeches grow up below them. All pictures are of the same
-stand, at four places of the slider.
+stand, at four places of the slider, behind a woman of 1.70 m.
 """
 
 from __future__ import annotations
@@ -17,11 +17,13 @@ from pathlib import Path
 
 import bpy
 import numpy as np
+from numpy.typing import NDArray
 
 from devtools import session
 
 from . import stage
 from .close_ups import render
+from .figure import add_figure
 from .paper.pictures import save_sheet
 from .seasons import LOOKS, sky
 
@@ -42,9 +44,11 @@ SEEDS = {
     "hazel": 1.0,
 }
 #: Sides of the stand and of the land, and how high the land rolls, meters.
-_SIDE, _LAND, _ROLL = 100.0, 340.0, 1.4
-_EYE, _AHEAD, _LENS = (-22.0, -112.0, 15.0), (0.0, 0.0, 9.0), 34.0
-_SUN = (36.0, 238.0)
+_SIDE, _LAND, _ROLL = 100.0, 260.0, 1.4
+#: Stand and land reach beyond both sides of the picture.
+_EYE, _AHEAD, _LENS = (-34.0, -95.0, 3.0), (4.0, 0.0, 13.0), 30.0
+_FIGURE = (-27.0, -68.0)
+_SUN = (27.0, 292.0)
 #: Fraction below which space counts as hidden: between trunks one sees far.
 _HIDDEN = 0.001
 
@@ -70,6 +74,7 @@ def build(scene: bpy.types.Scene, years: int = max(YEARS)) -> bpy.types.Object:
     grown = run_to_end(new_stand_steps(scene, bpy.context.evaluated_depsgraph_get(), [plot]))
     print(f"{grown.plants:,} plants after {grown.years} years, {grown.records:,} records", flush=True)
     run_to_end(cover_steps(scene, bpy.context.evaluated_depsgraph_get(), scene.tetflora.populate, grounds=[land]))
+    add_figure(scene, (*_FIGURE, float(_height(*np.array(_FIGURE))))).rotation_euler.z = 2.6
     stage.camera(scene, _EYE, _AHEAD, lens=_LENS, far=2000.0)
     scene.tetflora.hidden = _HIDDEN
     stage.sun(scene, _SUN[0], _SUN[1] - 180.0)
@@ -78,16 +83,20 @@ def build(scene: bpy.types.Scene, years: int = max(YEARS)) -> bpy.types.Object:
     return grown.field
 
 
+def _height(x: NDArray[np.float64], y: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Of the land, meters."""
+    return _ROLL * (np.sin(0.045 * x + 0.6) * np.cos(0.038 * y) + 0.3 * np.sin(0.11 * (x - y)))
+
+
 def _grid(name: str, side: float, step: float) -> bpy.types.Object:
     """A square that rolls a little."""
     count = round(side / step)
     at = np.linspace(-side / 2, side / 2, count + 1)
     x, y = (grid.ravel() for grid in np.meshgrid(at, at))
-    z = _ROLL * (np.sin(0.045 * x + 0.6) * np.cos(0.038 * y) + 0.3 * np.sin(0.11 * (x - y)))
     corner = (np.arange(count)[:, None] * (count + 1) + np.arange(count)).ravel()
     faces = corner[:, None] + [0, 1, count + 2, count + 1]
     mesh = bpy.data.meshes.new(name)
-    mesh.from_pydata(np.stack([x, y, z], axis=1).tolist(), [], faces.tolist())
+    mesh.from_pydata(np.stack([x, y, _height(x, y)], axis=1).tolist(), [], faces.tolist())
     mesh.shade_smooth()
     return bpy.data.objects.new(name, mesh)
 
@@ -102,7 +111,7 @@ def render_grown(path: Path, size: tuple[int, int] = SIZE, samples: int = SAMPLE
             field.tetflora.stand_year = year
             bpy.context.view_layer.update()
             made.append(Path(folder) / f"{year}.png")
-            render(made[-1], size, samples, 0.42, beyond=0.05)
+            render(made[-1], size, samples, 0.45, beyond=0.05)
         names = [f"{year} years" for year in YEARS]
         save_sheet(list(zip(made, names, strict=True)), 2, path)
 

@@ -19,6 +19,7 @@ from tetflora_addon.blender.placing import plant_objects, terrain
 from tetflora_addon.planting import places, rules
 
 from . import stage
+from .haze import add_haze
 from .terrain import Terrain, elevation
 
 PLANTS = 8_636
@@ -38,6 +39,10 @@ SPECIES = {
 _SCALE = 0.1
 _ACROSS = 420.0  # meters that the paper's number of plants takes along each side
 _ROW, _COLUMN = 96, 120  # of the elevation model, where the land begins that the camera sees first
+
+#: Of the picture of the documentation: height of the sun and where its light goes, degrees; extinction, 1/m, and
+#: airlight.
+_SUN, _HAZE = (24.0, 112.0), (0.0003, (0.40, 0.47, 0.58))
 
 
 def build(scene: bpy.types.Scene, plants: int = PLANTS, pixels: int = 512) -> None:
@@ -73,15 +78,18 @@ def build(scene: bpy.types.Scene, plants: int = PLANTS, pixels: int = 512) -> No
     stage.film(scene)
 
 
-def render_landscape(path: Path, width: int = 960, samples: int = 64) -> None:
+def render_landscape(path: Path, width: int = 960, samples: int = 32) -> None:
     """Refine the landscape in a file of its own and render it, wide, in Cycles."""
     session.clean_file()
     scene = bpy.context.scene
     build(scene)
+    bpy.data.objects.remove(scene.objects["Sun"])
+    stage.daylight(scene, *_SUN)
+    add_haze(scene, *_HAZE)
     render = scene.render
     render.resolution_x, render.resolution_y = width, width * 9 // 16
     render.engine, render.image_settings.file_format, render.filepath = 'CYCLES', 'PNG', str(path)
-    scene.cycles.samples, scene.cycles.use_denoising = samples, False
+    scene.cycles.samples, scene.cycles.use_denoising = samples, True
     scene.tetflora.refine_at_render = False
     refine.refine(scene, bpy.context.evaluated_depsgraph_get())
     bpy.ops.render.render(write_still=True)

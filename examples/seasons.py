@@ -5,7 +5,7 @@
     python -m examples.seasons            # docs/images/seasons.jpg
     python -m examples.seasons --out out/seasons --only winter --width 640 --samples 16
 
-The sun stands as high as it does in each of the seasons, in the morning or in the afternoon.
+The sun stands as high as it does in each of the seasons, early or late in the day, and to the left.
 """
 
 from __future__ import annotations
@@ -71,19 +71,19 @@ class Look:
 
 LOOKS = {
     "winter": Look(
-        18.0, 1.0, (13.0, 232.0), 4.6, (1.0, 0.78, 0.56),
+        18.0, 1.0, (13.0, 296.0), 4.6, (1.0, 0.78, 0.56),
         ((0.92, 0.86, 0.82), (0.44, 0.58, 0.82), (0.10, 0.22, 0.48)), 0.8, 0.45, (0.0008, (0.66, 0.72, 0.82)), 0.50,
     ),
     "spring": Look(
-        114.0, 0.0, (40.0, 236.0), 5.0, (1.0, 0.94, 0.84),
+        114.0, 0.0, (30.0, 294.0), 5.0, (1.0, 0.94, 0.84),
         ((0.76, 0.86, 0.96), (0.26, 0.48, 0.86), (0.05, 0.17, 0.50)), 0.85, 0.6, (0.0005, (0.50, 0.64, 0.82)), 0.45,
     ),
     "summer": Look(
-        200.0, 0.0, (52.0, 240.0), 5.2, (1.0, 0.95, 0.86),
+        200.0, 0.0, (38.0, 292.0), 5.2, (1.0, 0.95, 0.86),
         ((0.72, 0.84, 0.96), (0.22, 0.44, 0.86), (0.04, 0.15, 0.48)), 0.85, 0.5, (0.0005, (0.50, 0.64, 0.82)), 0.43,
     ),
     "autumn": Look(
-        292.0, 0.0, (24.0, 238.0), 5.0, (1.0, 0.86, 0.66),
+        292.0, 0.0, (18.0, 298.0), 5.0, (1.0, 0.86, 0.66),
         ((0.88, 0.86, 0.84), (0.36, 0.53, 0.82), (0.08, 0.22, 0.50)), 0.8, 0.5, (0.0009, (0.66, 0.68, 0.72)), 0.44,
     ),
 }  # fmt: skip
@@ -129,6 +129,7 @@ def wooded(x: NDArray[np.float64], y: NDArray[np.float64]) -> NDArray[np.float64
 def build(scene: bpy.types.Scene) -> None:
     """Fill an empty scene with land, trees and what covers the ground; `dress` gives it a season."""
     _add_cherry(scene)
+    _add_log(scene)
     for species, seed, (x, y), scale, age in _LONE:
         stage.plant(scene, species, seed, (x, y, float(height(np.float64(x), np.float64(y)))), 2.4 * seed, scale, age)
     for name, side, step, hole in (("Near", _NEAR, 2.0, 0.0), ("Far", _LAND, 5.0, _NEAR)):
@@ -159,6 +160,14 @@ def _add_cherry(scene: bpy.types.Scene) -> None:
     orders = [{**one, **_CHERRY_LEAVES} if one.get("leaves", [0])[0] > 0 else one for one in page["orders"]]
     year = {**page["year"], "leaf": {**page["year"]["leaf"], "fresh": [0.16, 0.15, 0.04]}}
     store_species(scene, "cherry", {**page, "name": "Cherry", "orders": orders, "year": year})
+
+
+def _add_log(scene: bpy.types.Scene) -> None:
+    """Let the logs of birches have lost their bark, which would draw all eyes from the middle of the meadow."""
+    from tetflora_addon.blender.placing.cover import fallen_from
+    from tetflora_addon.blender.species.edits import species_data, store_species
+
+    store_species(scene, "birch_log", species_data(scene, fallen_from(scene, "oak", "log")))
 
 
 def _ground(name: str, side: float, step: float, hole: float) -> bpy.types.Object:

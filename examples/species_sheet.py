@@ -39,12 +39,14 @@ def _points(mesh: bpy.types.Mesh) -> np.ndarray:
     return points.reshape(-1, 3)
 
 
-def species_cell(identifier: str, name: str, polygons: dict[str, int]) -> Callable[[], tuple[np.ndarray, str]]:
+def plant_cell(
+    identifier: str, name: str, polygons: dict[str, int], seed: int = SEED, age: float = 0.0
+) -> Callable[[], tuple[np.ndarray, str]]:
     """Puts one plant of a species into the scene, as a mesh, and its number of polygons into ``polygons``."""
 
     def build() -> tuple[np.ndarray, str]:
         scene = bpy.context.scene
-        empty = stage.plant(scene, identifier, SEED, (0.0, 0.0, 0.0))
+        empty = stage.plant(scene, identifier, seed, (0.0, 0.0, 0.0), age=age)
         bpy.context.view_layer.update()
         steps = plant_mesh.make_plant_mesh_steps(scene, bpy.context.evaluated_depsgraph_get(), [empty])
         (plant,) = run_to_end(steps)
@@ -93,7 +95,7 @@ def render_sheet(path: Path, samples: int = 32, identifiers: Sequence[str] | Non
     known, polygons = catalog.list_species(), {}
     order = sorted(identifiers or known, key=lambda one: -crown_of(catalog.load_species(one)).height)
     with tempfile.TemporaryDirectory() as folder:
-        cells = [species_cell(one, known[one].name, polygons) for one in order]
+        cells = [plant_cell(one, known[one].name, polygons) for one in order]
         save_sheet(render_cells(cells, Path(folder), SIZE, samples), COLUMNS, path)
     return polygons
 

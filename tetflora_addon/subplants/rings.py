@@ -282,11 +282,13 @@ def fine_rings(flora: Flora, whole: WholeBranches, fine: Fineness, counts: Integ
     deep, narrow = depths(footed[base], -index[below])
     deep *= fine.weight[base] * np.where(footed[base], branches.radius[base], radius[below])
     t[below] = -deep / np.maximum(branches.length[base], _SHORTEST)
-    light[below] *= narrow.astype(np.float32)
+    # As much narrower as deep: where there is little of a ball, a flat end would turn normals of the wood before it.
+    light[below] *= (1.0 + fine.weight[base] * (narrow - 1.0)).astype(np.float32)
     down = (below * t * branches.length[owner])[:, None] * branches.frame[owner, :, 2]
     last = owner[above]
     high, narrow, slant = beyond(rows, branches, last, index[above] - counts[last, segment[above]])
     high *= fine.weight[last] * radius[above]
+    narrow = 1.0 + fine.weight[last] * (narrow - 1.0)
     slant *= fine.weight[last] * radius[above] * narrow
     t[above] += high / np.maximum(branches.length[last], _SHORTEST)
     light[above] *= narrow.astype(np.float32)

@@ -26,9 +26,12 @@ from tetflora_addon.subplants.rings import (
     DEVIATION,
     MOST_SIDES,
     PLACES,
+    Fineness,
     Pixels,
     buttresses,
     collars,
+    fine_counts,
+    fine_rings,
     fine_sides,
     fineness,
     finer,
@@ -222,6 +225,22 @@ def test_stems_leave_a_fork_without_a_gap(forks: int) -> None:
     ball = beyond[(away > 0.4 * radius) & (away < 1.5 * radius)]
     ball /= np.linalg.norm(ball, axis=1)[:, None]
     assert np.degrees(np.arccos(np.clip((directions @ ball.T).max(axis=1), -1.0, 1.0))).max() < 30.0
+
+
+@pytest.mark.parametrize("weight", [0.02, 0.3, 1.0])
+def test_ends_are_round_however_much_there_is_of_them(weight: float) -> None:
+    """A flat end would turn the normals of all wood before it, which gets snow and light by them."""
+    forks = {"forks": [2, 0], "fork_at": 0.4, "fork_angle": [40, 5], "branches": [0, 0]}
+    flora = support.compiled(support.small(order0=forks))
+    for whole in grown(flora, seed=4):
+        fine = Fineness(flora.rows["sides"][whole.branches.row], np.full(len(whole), weight), np.full(len(whole), 5.0))
+        rings = fine_rings(flora, whole, fine, fine_counts(flora, whole, fine, even(0.01)))
+        radius = np.linalg.norm(rings.reach[0], axis=0)
+        for outside, step in ((rings.t > 1.0, -1), (rings.t < 0.0, 1)):
+            first = np.flatnonzero(outside & ~np.roll(outside, -step))
+            assert (rings.branch[first] == rings.branch[first + step]).all()
+            away = np.linalg.norm(rings.center[first] - rings.center[first + step], axis=1)
+            assert (radius[first + step] - radius[first] < 0.3 * away).all()
 
 
 def test_only_what_grows_on_living_wood_has_a_collar() -> None:
