@@ -56,8 +56,8 @@ _BEND = 1 / 8
 class Stand:
     """Plants of a scene, or some of them that stand for all."""
 
-    number: int  # all plants
-    foot: Floats  # (k, 3): where some of them stand, meters
+    number: Floats  # (k,): plants that each stands for
+    foot: Floats  # (k, 3): where they stand, meters
     scale: Floats  # (k,)
     which: Integers  # (k,): their crowns, as indices into the next
     crowns: tuple[Crown, ...]
@@ -104,7 +104,7 @@ class Stand:
             part = replace(
                 part,
                 position=np.stack([x, y, z], axis=1) + self.foot[plant],
-                number=part.number * each * (self.number / len(self.foot)),
+                number=part.number * each * self.number[plant],
                 area=part.area * scale**2,
                 width=part.width * scale,
                 length=part.length * scale,
@@ -151,15 +151,16 @@ def estimate(
     parts, plant = stand.parts(camera)
     extent = camera.extent_around(parts.position)
     whole = _polygons(stand.crowns, parts, stand.which[plant], camera, extent)
-    seconds, memory = SECONDS + SECONDS_PER_PLANT * stand.number, used + BYTES_PER_PLANT * stand.number
+    plants = round(stand.number.sum())
+    seconds, memory = SECONDS + SECONDS_PER_PLANT * plants, used + BYTES_PER_PLANT * plants
     if everything:
         made = whole @ parts.number
         memory += BYTES_PER_TRIANGLE * float(made[1])
-        return Estimate(stand.number, float(made[0]), seconds + float(SECONDS_EXPANDED @ made), memory, False)
+        return Estimate(plants, float(made[0]), seconds + float(SECONDS_EXPANDED @ made), memory, False)
     wanted = _number(stand, camera, settings, parts, plant, extent, whole[0])
     made = min(wanted, settings.max_polygons or np.inf, allowed / BYTES_PER_POLYGON)
     seconds, memory = seconds + SECONDS_PER_PRIMITIVE * made, memory + BYTES_PER_POLYGON * made
-    return Estimate(stand.number, made, seconds, memory, wanted > made)
+    return Estimate(plants, made, seconds, memory, wanted > made)
 
 
 def _number(
@@ -251,8 +252,8 @@ def _layers(stand: Stand, parts: CrownParts, plant: Integers, extent: Floats) ->
     """Layers of leaves (n,) that are drawn where parts are: parts of a crown that are small are drawn as a whole."""
     radius = np.maximum(stand.radius, 1e-9)
     # Of plants that stand for others as well, the leaves of one.
-    area = np.bincount(plant, parts.number * parts.area, len(radius)) * (len(radius) / max(stand.number, 1))
-    through = area / (np.pi * radius**2)
+    area = np.bincount(plant, parts.number * parts.area, len(radius))
+    through = area / (np.pi * radius**2 * stand.number)
     return _LAYERS + through[plant] * np.minimum(DETAIL * extent / (2.0 * radius[plant]), 1.0)
 
 

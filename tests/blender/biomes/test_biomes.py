@@ -126,6 +126,20 @@ def test_shipped_biomes_are_sound(path):
     assert biome.description and library.biomes()[path.stem].name == biome.name
 
 
+def test_files_that_have_not_changed_are_read_once(tmp_path, monkeypatch):
+    """Panels ask for biomes while they are drawn."""
+    own = tmp_path / "species" / "biomes"
+    own.mkdir(parents=True)
+    (own / "mine.json").write_text('{"name": "One"}', encoding="utf-8")
+    read, read_whole = [], library.read_whole
+    monkeypatch.setattr(library, "read_whole", lambda path, most: read.append(path.stem) or read_whole(path, most))
+    assert library.biomes()["mine"].name == "One"
+    read.clear()
+    assert library.biomes()["mine"].name == "One" and read == []
+    (own / "mine.json").write_text('{"name": "Another"}', encoding="utf-8")
+    assert library.biomes()["mine"].name == "Another" and read == ["mine"]
+
+
 @pytest.mark.parametrize(
     "name", ["alpine_treeline", "beech_fern", "birch_pine", "oak_savanna", "riparian_willow", "spruce_forest"]
 )

@@ -12,6 +12,7 @@ import pytest
 from tests.blender.scenes import add_camera, add_mesh, add_plant, depsgraph, select
 from tetflora_addon import memory
 from tetflora_addon.blender.job import contents, forecast, refine
+from tetflora_addon.blender.runtime import Patience
 from tetflora_addon.blender.scene.camera import read_camera
 from tetflora_addon.processes import pool
 
@@ -26,7 +27,7 @@ def _afresh():
 def _forecast():
     bpy.context.view_layer.update()
     bpy.context.evaluated_depsgraph_get()
-    forecast._counted.took = 0.0  # as if counting took no time
+    forecast._counted.patience = Patience()  # as if counting took no time
     return forecast.forecast(bpy.context.scene, bpy.context.view_layer)
 
 
@@ -95,6 +96,19 @@ def test_large_fields_are_known_by_a_sample():
     assert len(forecast._counted.stand.foot) == forecast._LOOKED_AT
     add_plant(species="oak")
     assert _forecast().plants == 30_001
+
+
+def test_few_trees_are_not_lost_in_much_cover():
+    """Two of a hundred were looked at beside the cover of First Forest."""
+    add_camera()
+    _wood(30_000, as_field='FIELD', species="bush")
+    for number in range(40):
+        add_plant(f"p{number}", species="birch", location=(0.5 * number, 9.0, 0.0))
+    assert _forecast().plants == 30_040
+    stand = forecast._counted.stand
+    trees = stand.radius > 1.5
+    assert 20 <= trees.sum() <= 40 and len(stand.foot) <= forecast._LOOKED_AT + 1
+    assert stand.number[trees].sum() == pytest.approx(40.0)
 
 
 def test_instances_of_collections_count():
@@ -187,7 +201,8 @@ def test_many_plants_are_not_counted_at_every_redraw():
     add_camera()
     add_plant(species="birch")
     assert _forecast().plants == 1
-    forecast._counted.took = 100.0  # as if there were millions
+    for _ in range(2):
+        forecast._counted.patience.took(100.0)  # as if there were millions
     add_plant("other", species="birch")
     bpy.context.view_layer.update()
     assert forecast.forecast(bpy.context.scene, bpy.context.view_layer).plants == 1
