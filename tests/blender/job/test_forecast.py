@@ -12,7 +12,6 @@ import pytest
 from tests.blender.scenes import add_camera, add_mesh, add_plant, depsgraph, select
 from tetflora_addon import memory
 from tetflora_addon.blender.job import contents, forecast, refine
-from tetflora_addon.blender.runtime import Patience
 from tetflora_addon.blender.scene.camera import read_camera
 from tetflora_addon.processes import pool
 
@@ -27,7 +26,6 @@ def _afresh():
 def _forecast():
     bpy.context.view_layer.update()
     bpy.context.evaluated_depsgraph_get()
-    forecast._counted.patience = Patience()  # as if counting took no time
     return forecast.forecast(bpy.context.scene, bpy.context.view_layer)
 
 
@@ -197,16 +195,17 @@ def test_the_automatic_limit_is_told(monkeypatch):
     assert forecast.memory_text(scene) == "Automatic: no limit"
 
 
-def test_many_plants_are_not_counted_at_every_redraw():
+def test_plants_are_counted_again_only_when_something_has_changed(monkeypatch):
     add_camera()
     add_plant(species="birch")
     assert _forecast().plants == 1
-    for _ in range(2):
-        forecast._counted.patience.took(100.0)  # as if there were millions
+    counted, count = [], forecast._count
+    monkeypatch.setattr(forecast, "_count", lambda *given: counted.append(1) or count(*given))
+    for _ in range(3):
+        assert forecast.forecast(bpy.context.scene, bpy.context.view_layer).plants == 1
+    assert not counted
     add_plant("other", species="birch")
-    bpy.context.view_layer.update()
-    assert forecast.forecast(bpy.context.scene, bpy.context.view_layer).plants == 1
-    assert _forecast().plants == 2
+    assert _forecast().plants == 2 and counted
 
 
 def test_denoising_needs_memory_that_results_cannot_have(monkeypatch):

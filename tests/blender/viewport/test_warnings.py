@@ -114,34 +114,21 @@ def test_crowns_of_a_field_count_and_are_asked_for_by_species(monkeypatch):
     assert "crown" not in _keys()
 
 
-def test_looking_takes_a_thirtieth_of_the_time_whatever_the_first_look_took():
-    patience = runtime.Patience()
-    assert patience.seconds == 0.0
-    patience.took(1.5)
-    assert patience.seconds == 0.0
-    patience.took(0.1)
-    assert patience.seconds == pytest.approx(3.0)
-    patience.took(2.0)
-    assert patience.seconds == pytest.approx(3.0)
-    patience.took(2.0)
-    assert patience.seconds == pytest.approx(60.0)
-
-
 def test_a_slow_first_look_does_not_delay_the_next(monkeypatch):
     clock, waits = [0.0], []
     monkeypatch.setattr(runtime, "time", SimpleNamespace(perf_counter=lambda: clock[0]))
     monkeypatch.setattr(runtime, "call_soon", lambda _function, seconds: waits.append(seconds))
     monkeypatch.setattr(runtime, "bpy", SimpleNamespace(app=SimpleNamespace(background=False), context=bpy.context))
-    takes = iter((1.5, 0.01, 0.01))
+    takes = iter((1.5, 0.01, 0.01, 2.0, 2.0, 0.0))
 
     def find(_scene, _layer):
         clock[0] += next(takes)
 
     outlook = runtime.Outlook(find)
-    for _ in range(3):
+    for _ in range(6):
         outlook.ask()
         outlook._look()
-    assert waits == pytest.approx([0.2, 0.2, 0.3])
+    assert waits == pytest.approx([0.2, 0.2, 0.3, 0.3, 0.3, 60.0])
 
 
 def test_grounds_that_are_small_or_scaled_are_mended():

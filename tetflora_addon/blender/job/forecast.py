@@ -6,7 +6,6 @@ Plants are counted, some of them looked at, and figures computed a moment after 
 often than a few hundredths of the time allow; never while a panel is drawn.
 """
 
-import time
 from contextlib import suppress
 from dataclasses import dataclass, replace
 
@@ -24,7 +23,7 @@ from ...growth.seasons import PRESENT, expected_of
 from ...processes import pool
 from ...species.kinds import species_of
 from ..attributes import read, values_of
-from ..runtime import Handlers, Outlook, Patience
+from ..runtime import Handlers, Outlook
 from ..scene.ages import crown_kinds
 from ..scene.camera import read_camera
 from ..scene.crowns import crown_to_draw
@@ -42,12 +41,10 @@ _GIGA, _MEGA = memory.GIGABYTE, 1e6
 
 @dataclass
 class _Counted:
-    """The stand of one view layer, when it was counted, and when that may be done again."""
+    """The stand of one view layer, and whether that has changed."""
 
     layer: tuple[str, str] | None = None
     stand: Stand | None = None
-    at: float = 0.0
-    patience: Patience = Patience()
     stale: bool = True
 
 
@@ -128,12 +125,9 @@ def polygons_text(number: float) -> str:
 
 
 def _stand_of(scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer) -> Stand | None:
-    layer, now = (scene.session_uid, view_layer.name), time.perf_counter()
-    waits = now - _counted.at < _counted.patience.seconds
-    if _counted.stand is None or _counted.layer != layer or (_counted.stale and not waits):
+    layer = scene.session_uid, view_layer.name
+    if _counted.stand is None or _counted.layer != layer or _counted.stale:
         _counted.stand, _counted.layer, _counted.stale = _count(scene, view_layer), layer, False
-        _counted.at = time.perf_counter()
-        _counted.patience.took(_counted.at - now)
     return _counted.stand
 
 

@@ -156,33 +156,24 @@ def _fields(scene: bpy.types.Scene) -> Iterator[tuple[bpy.types.Object, Floats]]
 
 def _crowns(scene: bpy.types.Scene, at: Floats) -> tuple[Floats, Floats]:
     """Feet (n, 3), and radii and heights (n, 2), of plants near a place, meters; sizes are 0 of unknown crowns."""
-    single = [
-        o
-        for o in plants_of(scene.objects)
-        if o.tetflora.enabled and (o.matrix_world.translation.xy - Vector(at[:2])).length < _NEAR
-    ]
-    # Single plants have a species each, points one of their field's; scales.
-    parts: list[tuple] = [
-        (
-            np.array([o.matrix_world.translation for o in single]).reshape(-1, 3),
-            [o.tetflora.species for o in single],
-            np.arange(len(single)),
-            np.array([o.matrix_world.median_scale for o in single]),
-        )
-    ]
+    found: list[tuple] = []  # feet, species, which of these each is, and scales
+    for obj in plants_of(scene.objects):
+        foot = obj.matrix_world.translation
+        if obj.tetflora.enabled and (foot.xy - Vector(at[:2])).length < _NEAR:
+            found.append((np.array([foot]), [obj.tetflora.species], [0], obj.matrix_world.median_scale))
     for field, own in _fields(scene):
         near = np.flatnonzero(np.linalg.norm(own[:, :2] - at[:2], axis=1) < _NEAR)
         if len(names := [species_of(kind) for kind in field_kinds(field)]) and len(near):
             which, scale = (stored(field.data, name, near) for name in ("species", "scale"))
-            which = np.zeros(len(near)) if which is None else np.clip(which, 0, len(names) - 1)
-            parts.append((own[near], names, which.astype(np.int64), 1.0 if scale is None else scale))
-    crowns = {name: crown_to_draw(scene, name) for name in {name for _, names, *_ in parts for name in names}}
+            which = np.clip(np.zeros(len(near)) if which is None else which, 0, len(names) - 1).astype(np.int64)
+            found.append((own[near], names, which, 1.0 if scale is None else scale))
+    crowns = {name: crown_to_draw(scene, name) for name in {name for _, names, *_ in found for name in names}}
     size = {name: (0.0, 0.0) if crown is None else (crown.radius, crown.height) for name, crown in crowns.items()}
-    sizes = [
-        np.array([size[name] for name in names]).reshape(-1, 2)[which] * np.reshape(scale, (-1, 1))
-        for _, names, which, scale in parts
-    ]
-    return np.concatenate([feet for feet, *_ in parts]), np.concatenate(sizes)
+    feet, sizes = [np.zeros((0, 3))], [np.zeros((0, 2))]
+    for foot, names, which, scale in found:
+        feet.append(foot)
+        sizes.append(np.array([size[name] for name in names])[which] * np.reshape(scale, (-1, 1)))
+    return np.concatenate(feet), np.concatenate(sizes)
 
 
 def _camera(scene: bpy.types.Scene, place: Floats) -> Iterator[Warned]:
