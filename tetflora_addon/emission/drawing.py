@@ -10,6 +10,7 @@ of which lies behind full pixels as a whole.
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
@@ -165,8 +166,11 @@ def drawn_blocks(given: Drawing) -> Iterator[Block | Parts | Shown]:
             some = [other.take(slice(0)) for other in outside]
             some[kind] = own.take(slice(start, start + _OUTSIDE_BATCH))
             items.append((len(tiles), None, some, len(some[kind]) / sum(map(len, outside))))
+    del tiles, outside
     whole = max(len(items), 1)
-    for number, made in enumerate(in_processes(_drawn_tile, given, items)):
+    # What was sent is let go: the parts of all tiles are a fifth of what is there before anything is made of them.
+    given_away = (items.pop(0) for _ in range(len(items)))
+    for number, made in enumerate(in_processes(_drawn_tile, given, given_away)):
         while made:
             one = made.pop(0)
             yield replace(one, fraction=(number + 1) / whole) if isinstance(one, Block) else one
@@ -185,7 +189,7 @@ def _tiles(
     frontier = Frontier(given.kinds, whole, given.facet)
     inside, outside = [], []
     for kind, some in zip(given.kinds, given.parts, strict=True):
-        found, beyond, columns = [some.take(slice(0))], [some.take(slice(0))], [np.zeros(0, np.int64)]
+        found, beyond = [[some.take(slice(0))] for _ in range(number)], [some.take(slice(0))]
         while len(some):
             pool = frontier.pool(kind, some)
             prints = whole.of_spheres(pool.center, pool.radius)
@@ -194,21 +198,18 @@ def _tiles(
             wide = ~out & (high - low > TILE / 2) & kind.can_open(some)
             beyond.append(some.take(np.flatnonzero(out)))
             stay = np.flatnonzero(~out & ~wide)
-            found.append(some.take(stay))
             middle = np.clip(whole.project(pool.center[stay])[0], 0, whole.width - 1)
-            columns.append(np.searchsorted(ends, middle, side="right") - 1)
+            column = np.clip(np.searchsorted(ends, middle, side="right") - 1, 0, number - 1)
+            for tile, own in enumerate(found):
+                own.append(some.take(stay[column == tile]))
             some = kind.opened(kind.met(some.take(np.flatnonzero(wide)), frontier.shown))[0]
-        inside.append((type(some).concatenate(found), np.clip(np.concatenate(columns), 0, number - 1)))
+        inside.append([kind.ordered(type(some).concatenate(found.pop(0))) for _ in range(number)])
         outside.append(kind.ordered(type(some).concatenate(beyond)))
-    tiles, every = [], max(sum(len(own) for own, _ in inside), 1)
-    for tile in range(number):
-        own = [
-            kind.ordered(some.take(np.flatnonzero(column == tile)))
-            for kind, (some, column) in zip(given.kinds, inside, strict=True)
-        ]
+    tiles, every = [], max(sum(map(len, itertools.chain(*inside))), 1)
+    for tile, (first, end) in enumerate(itertools.pairwise(ends.tolist())):
+        own = [of[tile] for of in inside]
         if any(map(len, own)):
-            share = 0.5 * sum(map(len, own)) / every + 0.5 / number
-            tiles.append(((int(ends[tile]), int(ends[tile + 1])), own, share))
+            tiles.append(((first, end), own, 0.5 * sum(map(len, own)) / every + 0.5 / number))
     return tiles, outside, frontier.shown
 
 
@@ -240,21 +241,24 @@ class _Tile:
         self.number = 0.0
 
     def made(self, number: int) -> list[Block | Parts | Shown]:
-        """Meshes by kind, facets by whose they are, and what is drawn as it is."""
+        """Meshes by kind, facets by whose they are, and what is drawn as it is; the tile lets go of each."""
         blocks = [
-            Block(kind, form, species, number, whole, 1.0)
-            for (kind, form, species), some in sorted(self._meshes.items())
-            if (whole := concatenate_buffers(some)) is not None
+            Block(*what, number, whole, 1.0)
+            for what in sorted(self._meshes)
+            if (whole := concatenate_buffers(self._meshes.pop(what))) is not None
         ]
+        owners = sorted({one for one, _ in self._facets}, key=lambda one: (one[0] is None, one[0] or 0, one[1]))
         facets = [
             Parts(
                 whose[0],
                 tuple(
-                    (joined(self._facets[whose, seen]), seen) for seen in (True, False) if (whose, seen) in self._facets
+                    (joined(self._facets.pop((whose, seen))), seen)
+                    for seen in (True, False)
+                    if (whose, seen) in self._facets
                 ),
                 whose[1],
             )
-            for whose in sorted({one for one, _ in self._facets}, key=lambda one: (one[0] is None, one[0] or 0, one[1]))
+            for whose in owners
         ]
         return [*blocks, *facets, *self.frontier.shown]
 
