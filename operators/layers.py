@@ -359,7 +359,9 @@ class TETFLORA_OT_save_biome(Reporting, bpy.types.Operator):
 
     def invoke(self, context: bpy.types.Context, _event: bpy.types.Event) -> set[str]:
         biome = active_biome(context.scene)
-        self.name = self.name or (biome.name if biome is not None else "My biome")
+        shipped = biome is not None and any(one.name == biome.name and not one.is_own for one in biomes().values())
+        # A file of a shipped biome's name would take its place in the menu.
+        self.name = self.name or ("My biome" if biome is None else f"My {biome.name}" if shipped else biome.name)
         return context.window_manager.invoke_props_dialog(self)
 
     def run(self, context: bpy.types.Context) -> set[str]:

@@ -11,6 +11,9 @@ from bpy.utils import units
 from ..tetflora_addon.blender.species.catalog import FALLBACK_ICON, icon_of
 from .help import draw_help
 
+#: Scale of the pictures of a gallery where there is room.
+GALLERY = 5.0
+
 
 class _Helped:
     """Mix-in for panels with a page in the manual, which a button in the header opens."""
@@ -213,5 +216,12 @@ def draw_species(layout: bpy.types.UILayout, owner: bpy.types.PropertyGroup, ent
     row = layout.row()
     row.template_list(TETFLORA_UL_species.__name__, "", owner, entries, owner, f"{entries}_index", rows=2)
     column = row.column(align=True)
-    column.template_icon_view(owner, "add_species", show_labels=True, scale=1.0, scale_popup=5.0)
+    width = bpy.context.window.width if bpy.context.window is not None else 0
+    scale = gallery_scale(width, bpy.context.preferences.system.ui_scale)
+    column.template_icon_view(owner, "add_species", show_labels=True, scale=1.0, scale_popup=scale)
     Button("edit_list", 'REMOVE', "", given).draw(column)
+
+
+def gallery_scale(width: int, ui_scale: float) -> float:
+    """Scale of a gallery's pictures, of which Blender puts eight beside each other, in a window so many pixels wide."""
+    return GALLERY if width <= 0 or ui_scale <= 0.0 else min(GALLERY, (width / ui_scale - 60.0) / (8 * 20.0))

@@ -102,7 +102,8 @@ _Result = TypeVar("_Result")
 class Outlook(Generic[_Result]):
     """What panels say of a scene, found a moment after a change, and the less often the longer that takes.
 
-    So nothing computes while it is drawn. In the background, where no timer runs, it is found when it is asked for.
+    Of the last two times the shorter counts: what is prepared at first, or after a change, is there the next time. So
+    nothing computes while it is drawn. In the background, where no timer runs, it is found when it is asked for.
 
     Parameters
     ----------
@@ -115,12 +116,12 @@ class Outlook(Generic[_Result]):
     def __init__(self, find: Callable[[bpy.types.Scene, bpy.types.ViewLayer], _Result], old: float = inf) -> None:
         self._find, self._old = find, old
         self._found: dict[tuple[int, str], _Result] = {}
-        self._took, self._at = 0.0, -inf
+        self._took, self._at = (0.0, 0.0), -inf
         self._timer = partial(self._look)  # one object, which Blender can find again
 
         def ask(*_: object) -> None:
             if not bpy.app.background:
-                call_soon(self._timer, max(0.2, 30.0 * self._took))
+                call_soon(self._timer, max(0.2, 30.0 * min(self._took)))
 
         self.ask = ask
         self._handlers = Handlers(depsgraph_update_post=ask, undo_post=ask, redo_post=ask, load_post=ask)
@@ -139,7 +140,7 @@ class Outlook(Generic[_Result]):
         begin, windows = time.perf_counter(), bpy.context.window_manager.windows
         found = {(w.scene.session_uid, w.view_layer.name): self._find(w.scene, w.view_layer) for w in windows}
         self._at = time.perf_counter()
-        self._took = self._at - begin
+        self._took = self._took[1], self._at - begin
         if found != self._found:
             self._found = found
             redraw()

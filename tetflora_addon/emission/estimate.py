@@ -27,16 +27,17 @@ from ..refinement.decisions import explicit_fraction
 from ..refinement.settings import RefinementSettings
 from ..subplants.rings import BUD_RINGS, bud_sides, finer, round_up_to
 from .budget import A_PIXEL, BYTES_PER_POLYGON, BYTES_PER_TRIANGLE, relative_side
-from .drawing import HIDDEN, HIDDEN_A_PIXEL, HIDDEN_LEAVES, NEVER_TOO_MANY, OUTSIDE_A_PIXEL
+from .drawing import HIDDEN, HIDDEN_A_PIXEL, HIDDEN_LEAVES, LIT_LEAVES, NEVER_TOO_MANY, OUTSIDE_A_PIXEL, SHADOW
 from .frontier import DETAIL
 from .leaf_detail import NEARER, TOLERANCE
 from .plant_parts import BENT, BROAD, SIDES, TUBES, TWIG
 from .plants import kite_widths
 
-#: Seconds of any refinement, of each plant, and of each polygon or facet.
-SECONDS = 1.0
+#: Seconds of any refinement, of each plant, and of each polygon or facet that is seen, and that nobody sees: of these
+#: there are few for what is opened.
+SECONDS = 1.5
 SECONDS_PER_PLANT = 2.5e-5
-SECONDS_PER_PRIMITIVE = 5.5e-6
+SECONDS_PER_PRIMITIVE = np.array([3e-6, 1.2e-5])
 #: Seconds of each polygon that is expanded, and of each triangle that these consist of.
 SECONDS_EXPANDED = np.array([5e-7, 1.2e-7])
 #: Bytes of each plant.
@@ -44,8 +45,16 @@ BYTES_PER_PLANT = 500.0
 #: Leaves and branches that are looked at, about, how many of them lie in a cell of the image, and how many of a plant
 #: in view for one of a plant that is not.
 _PARTS, _IN_CELL, _IN_VIEW = 4096, 32, 16.0
-#: Layers of leaves in a covered pixel of which something is drawn, about: 11 to 16 in scenes from 20 to 600 m away.
-_LAYERS = 13.0
+#: Layers of leaves in a covered pixel of which something is drawn, with facets of a pixel, about; the larger these are,
+#: the more of them reach beyond what hides them, by the fifth root of their side.
+_LAYERS = 12.0
+#: Pixels that cells cover, which overlap, over those that their leaves do.
+_OVERLAP = 1.17
+#: Hidden facets that stand for others which were made with what hides them, over all that is seen.
+_MERGED = 0.1
+#: Leaves out of view that a facet stands for. Part of these that is lit and throws its shadow into the view, drawn by
+#: facets of `SHADOW` pixels; and how many times as many of those there are as of others out of view, at most.
+_LEAVES, _THROWN, _THROWN_TIMES = 32.0, 0.5, 2.0
 #: Leaves count as so much shorter than they are, about, see `leaf_meshes`.
 _SHARE = 0.85
 #: How far twigs are off their chords, in lengths of these: arcs of a radian.
@@ -56,8 +65,8 @@ _BEND = 1 / 8
 class Stand:
     """Plants of a scene, or some of them that stand for all."""
 
-    number: int  # all plants
-    foot: Floats  # (k, 3): where some of them stand, meters
+    number: Floats  # (k,): plants that each stands for
+    foot: Floats  # (k, 3): where they stand, meters
     scale: Floats  # (k,)
     which: Integers  # (k,): their crowns, as indices into the next
     crowns: tuple[Crown, ...]
@@ -104,7 +113,7 @@ class Stand:
             part = replace(
                 part,
                 position=np.stack([x, y, z], axis=1) + self.foot[plant],
-                number=part.number * each * (self.number / len(self.foot)),
+                number=part.number * each * self.number[plant],
                 area=part.area * scale**2,
                 width=part.width * scale,
                 length=part.length * scale,
@@ -151,18 +160,21 @@ def estimate(
     parts, plant = stand.parts(camera)
     extent = camera.extent_around(parts.position)
     whole = _polygons(stand.crowns, parts, stand.which[plant], camera, extent)
-    seconds, memory = SECONDS + SECONDS_PER_PLANT * stand.number, used + BYTES_PER_PLANT * stand.number
+    plants = round(stand.number.sum())
+    seconds, memory = SECONDS + SECONDS_PER_PLANT * plants, used + BYTES_PER_PLANT * plants
     if everything:
         made = whole @ parts.number
         memory += BYTES_PER_TRIANGLE * float(made[1])
-        return Estimate(stand.number, float(made[0]), seconds + float(SECONDS_EXPANDED @ made), memory, False)
-    wanted = _number(stand, camera, settings, parts, plant, extent, whole[0])
+        return Estimate(plants, float(made[0]), seconds + float(SECONDS_EXPANDED @ made), memory, False)
+    each = _numbers(stand, camera, settings, parts, plant, extent, whole[0])
+    wanted = float(each.sum())
     made = min(wanted, settings.max_polygons or np.inf, allowed / BYTES_PER_POLYGON)
-    seconds, memory = seconds + SECONDS_PER_PRIMITIVE * made, memory + BYTES_PER_POLYGON * made
-    return Estimate(stand.number, made, seconds, memory, wanted > made)
+    seconds += float(SECONDS_PER_PRIMITIVE @ each) * made / max(wanted, 1.0)
+    memory += BYTES_PER_POLYGON * made
+    return Estimate(plants, made, seconds, memory, wanted > made)
 
 
-def _number(
+def _numbers(
     stand: Stand,
     camera: Camera,
     settings: RefinementSettings,
@@ -170,30 +182,40 @@ def _number(
     plant: Integers,
     extent: Floats,
     whole: Floats,
-) -> float:
-    """Polygons and facets without limits; ``whole`` (n,) is `_polygons` of parts, ``extent`` (n,) meters of a pixel."""
+) -> Floats:
+    """Polygons and facets without limits that are seen, and that nobody sees (2,).
+
+    ``whole`` (n,) is `_polygons` of parts, ``extent`` (n,) meters of a pixel.
+    """
     pixels = camera.width * camera.height
     inside = _inside(parts, camera, extent)
-    leaves = np.where(inside | (parts.form < 0), 0.0, parts.number) / HIDDEN_LEAVES
+    outside = ~inside & (parts.form >= 0)
+    leaves = np.where(outside, parts.number, 0.0) / _LEAVES
     beside = stand.in_view(camera)[plant]
-    layers = _layers(stand, parts, plant, extent)
+    deep = _through(stand, parts, plant, extent)
+    shadows, shadow = parts.take(outside), SHADOW * extent[outside]
     one, each, planes = _kites(stand.crowns, parts, stand.which[plant])[:, inside]
     parts = parts.take(inside)
     extent, whole = extent[inside], whole[inside]
     area, wide, wood = parts.area / extent**2, parts.width / extent, parts.form < 0
-    drawn, covered = _drawn(parts, camera, parts.number * area, layers[inside])
-    coarser = _coarser(covered, pixels, settings.facet)
+    before, here, covered = _in_depth(parts, camera, parts.number * area)
+    coarser = _coarser(_OVERLAP * covered, pixels, settings.facet)
     facet = (coarser * settings.facet) ** 2
+    most = _LAYERS * facet**0.1 + deep[inside]
+    drawn = np.exp(-before / most) * -np.expm1(-here / most) * most / here
     # Leaves are facets, kites, or have their polygons; branches are triangles, or tubes.
     real = explicit_fraction(wide, coarser * settings.leaf_limit)
     faces = 1.0 + (planes - 1.0) * explicit_fraction(wide, one) + (whole - planes) * explicit_fraction(wide, each)
     leaf = (1.0 - real) * np.minimum(area / facet, 1.0) + real * faces
     tube = np.where(wide < BROAD, np.minimum(parts.sides, SIDES) * parts.segments, whole)
     tubes = explicit_fraction(wide, TUBES)
-    drawn = np.where(wood & (wide >= BROAD), 1.0, drawn)
     bows = np.clip(np.sqrt(_BEND * parts.length / (BENT * extent)), 1.0, np.maximum(parts.segments, 1))
     branch = tubes * tube + (1.0 - tubes) * bows * np.clip(area / (TWIG * facet), 0.0, 1.0)
     seen = float((drawn * parts.number) @ np.where(wood, branch, leaf))
+    # Areas without bounds are no number of facets.
+    thrown = shadows.number / np.fmax((coarser * shadow) ** 2 / np.maximum(shadows.area, 1e-300), LIT_LEAVES)
+    few = max(OUTSIDE_A_PIXEL * pixels, NEVER_TOO_MANY) / coarser**2
+    unseen = _MERGED * seen + min(_THROWN * float(thrown.sum()), _THROWN_TIMES * few)
     # Of what is not seen a facet stands for several leaves.
     behind = (1.0 - drawn) * parts.number * area / np.maximum(HIDDEN_LEAVES * area, HIDDEN**2 * facet)
     for number, a_pixel in (
@@ -201,8 +223,8 @@ def _number(
         (leaves[beside].sum(), OUTSIDE_A_PIXEL),  # drawn with what is seen of the same plants
         (leaves[~beside].sum(), OUTSIDE_A_PIXEL),
     ):
-        seen += min(float(number), max(a_pixel * pixels, NEVER_TOO_MANY) / coarser**2)
-    return seen
+        unseen += min(float(number), max(a_pixel * pixels, NEVER_TOO_MANY) / coarser**2)
+    return np.array([seen, unseen])
 
 
 def _inside(parts: CrownParts, camera: Camera, extent: Floats) -> Mask:
@@ -247,23 +269,22 @@ def _kites(crowns: tuple[Crown, ...], parts: CrownParts, which: Integers) -> Flo
     return out
 
 
-def _layers(stand: Stand, parts: CrownParts, plant: Integers, extent: Floats) -> Floats:
-    """Layers of leaves (n,) that are drawn where parts are: parts of a crown that are small are drawn as a whole."""
+def _through(stand: Stand, parts: CrownParts, plant: Integers, extent: Floats) -> Floats:
+    """Layers of leaves (n,) that are drawn beside those that fill pixels: of crowns that are small all are."""
     radius = np.maximum(stand.radius, 1e-9)
     # Of plants that stand for others as well, the leaves of one.
-    area = np.bincount(plant, parts.number * parts.area, len(radius)) * (len(radius) / max(stand.number, 1))
-    through = area / (np.pi * radius**2)
-    return _LAYERS + through[plant] * np.minimum(DETAIL * extent / (2.0 * radius[plant]), 1.0)
+    area = np.bincount(plant, parts.number * parts.area, len(radius))
+    through = area / (np.pi * radius**2 * stand.number)
+    return through[plant] * np.minimum(DETAIL * extent / (2.0 * radius[plant]), 1.0)
 
 
-def _drawn(parts: CrownParts, camera: Camera, pixels: Floats, most: Floats) -> tuple[Floats, float]:
-    """Fraction (n,) that is drawn of parts (n,) that have so many pixels (n,) in all, and the pixels that they cover.
+def _in_depth(parts: CrownParts, camera: Camera, pixels: Floats) -> tuple[Floats, Floats, float]:
+    """Layers (n,) before each of parts (n,) that have so many pixels (n,) in all, its own (n,), and covered pixels.
 
-    In each cell of the image parts lie one behind the other. So many layers (n,) of them are drawn; the farther behind,
-    the fewer are seen.
+    In each cell of the image parts lie one behind the other.
     """
     if not len(parts):
-        return np.zeros(0), 0.0
+        return np.zeros(0), np.zeros(0), 0.0
     local = camera.to_camera_space(parts.position)
     x, y, depth = local.T
     if camera.kind == "PANO":
@@ -277,15 +298,12 @@ def _drawn(parts: CrownParts, camera: Camera, pixels: Floats, most: Floats) -> t
     cell, tall = _groups(y, column, strips)
     size = np.maximum((wide[np.arange(len(tall)) // strips] * tall) * camera.width * camera.height, 1.0)
     order = np.lexsort((depth, cell))
-    own = cell[order]
-    layers = np.maximum(pixels[order] / size[own], 1e-12)
-    every = np.bincount(own, layers, len(size))
-    before = np.cumsum(layers) - layers - (np.cumsum(every) - every)[own]
-    drawn = np.empty(len(parts))
-    most = most[order]
-    drawn[order] = np.exp(-before / most) * -np.expm1(-layers / most) * most / layers
+    layers, own = np.maximum(pixels / size[cell], 1e-12), cell[order]
+    every = np.bincount(cell, layers, len(size))
+    before = np.empty(len(parts))
+    before[order] = np.cumsum(layers[order]) - layers[order] - (np.cumsum(every) - every)[own]
     # A layer of what is turned all ways covers a part of its area.
-    return drawn, float(-(size * np.expm1(-LEVEL * every)).sum())
+    return before, layers, float(-(size * np.expm1(-LEVEL * every)).sum())
 
 
 def _groups(place: Floats, group: Integers, number: int) -> tuple[Integers, Floats]:

@@ -24,6 +24,8 @@ from .rules import MOST_PLANTS, Companion, Rules, check_rules, species_by_weight
 from .site import REMEDIES, Sample, Site, SiteDraw, Zone, lines_of_paths
 
 _FOUNDERS = 0.1  # of the plants that seek each other
+#: Part of the places of a density down to which nobody is told that some had no room: distances thin all that is drawn.
+_TOLD = 0.5
 
 
 class Company:
@@ -323,7 +325,7 @@ class _Sowing:
                 f"a density of {rules.density:.3g} plants per m² makes less than one plant on {self.site.area:.3g} m²; "
                 "raise the density or use a larger surface"
             )
-        if kept and kept >= self.wanted:
+        if kept and kept >= (_TOLD if rules.by_density else 1.0) * self.wanted:
             return ""
         worst = max(self.lost, key=self.lost.__getitem__)
         if not self.suitable and self.drawn > 10_000:
@@ -336,6 +338,11 @@ class _Sowing:
         if rules.by_density and self.suitable:
             del passed["suitable"]  # these were never wanted
         least = min(passed, key=passed.__getitem__)
+        if least == "distance" and not kept:
+            return (
+                f"what stands there leaves no room at a Min Distance of {rules.min_distance:.3g} m; "
+                "lower Min Distance, or let fewer of the other plants grow"
+            )
         if least == "distance" and rules.by_density:  # places are drawn once, so that there may be room between them
             return (
                 f"the others would stand closer than the Min Distance of {rules.min_distance:.3g} m to a plant; "

@@ -5,7 +5,7 @@
 import os
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cache, lru_cache
 from pathlib import Path
 
 from ..errors import NAME, SpeciesError, quoted, readable
@@ -27,6 +27,7 @@ class SpeciesInfo:
     path: Path
 
 
+@cache
 def builtin_folder() -> Path:
     """Folder of the species files that are shipped."""
     return Path(__file__).resolve().parent.parent / "catalog"
@@ -51,7 +52,8 @@ def _species(path: Path, _stamp: tuple[int, int]) -> Species:
     return read_species(path)
 
 
-def _stamp(path: Path) -> tuple[int, int]:
+def stamp(path: Path) -> tuple[int, int]:
+    """When a file was written and its size: a change of it shows here."""
     try:
         status = os.lstat(path)
     except OSError:  # somebody has just deleted it
@@ -147,4 +149,4 @@ def load_species(
     if identifier not in known:
         raise SpeciesError(f'Unknown species "{readable(identifier, NAME)}"; available: {", ".join(known) or "none"}')
     path = known[identifier].path
-    return _species(path, _stamp(path))
+    return _species(path, stamp(path))

@@ -8,6 +8,7 @@ import copy
 import json
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import bpy
 import numpy as np
@@ -15,6 +16,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+from operators.layers import TETFLORA_OT_save_biome
 from tests.blender.scenes import add_mesh, datablocks, depsgraph, select
 from tetflora_addon.blender.biomes import adding, files, library
 from tetflora_addon.blender.file_library import as_text
@@ -126,6 +128,20 @@ def test_shipped_biomes_are_sound(path):
     assert biome.description and library.biomes()[path.stem].name == biome.name
 
 
+def test_files_that_have_not_changed_are_read_once(tmp_path, monkeypatch):
+    """Panels ask for biomes while they are drawn."""
+    own = tmp_path / "species" / "biomes"
+    own.mkdir(parents=True)
+    (own / "mine.json").write_text('{"name": "One"}', encoding="utf-8")
+    read, read_whole = [], library.read_whole
+    monkeypatch.setattr(library, "read_whole", lambda path, most: read.append(path.stem) or read_whole(path, most))
+    assert library.biomes()["mine"].name == "One"
+    read.clear()
+    assert library.biomes()["mine"].name == "One" and read == []
+    (own / "mine.json").write_text('{"name": "Another"}', encoding="utf-8")
+    assert library.biomes()["mine"].name == "Another" and read == ["mine"]
+
+
 @pytest.mark.parametrize(
     "name", ["alpine_treeline", "beech_fern", "birch_pine", "oak_savanna", "riparian_willow", "spruce_forest"]
 )
@@ -169,6 +185,17 @@ def test_a_biome_makes_what_its_file_says():
     adding.remove_biome(scene(), biomes()[0])
     add(small(), land, seed=1)
     assert not np.array_equal(places(biomes()[0].uid), first)
+
+
+@pytest.mark.parametrize(("name", "offered"), [("Park", "My Park"), ("Small", "Small")])
+def test_a_biome_is_not_offered_to_be_saved_in_place_of_a_shipped_one(name, offered):
+    """Its file would have the name of the shipped one, and hide that in the menu."""
+    add(small(name=name), add_mesh("ground", size=6.0))
+    tool = SimpleNamespace(name="")
+    manager = SimpleNamespace(invoke_props_dialog=lambda _: {'RUNNING_MODAL'})
+    context = SimpleNamespace(scene=scene(), window_manager=manager)
+    assert TETFLORA_OT_save_biome.invoke(tool, context, None) == {'RUNNING_MODAL'}
+    assert tool.name == offered
 
 
 def test_what_is_saved_comes_back():

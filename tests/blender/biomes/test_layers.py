@@ -140,6 +140,22 @@ def test_copies_grow_on_the_same_or_on_another_ground():
         _ops().duplicate_layer(to_selected=True)
 
 
+@pytest.mark.parametrize("rules", [dict(by_density=True, density=300.0, min_distance=0.3), dict(count=40)])
+def test_plants_of_a_copy_stand_elsewhere(rules):
+    """At the places of the original there is no room, or two plants would be in one."""
+    layer = _scatter("Bushes", 40)
+    layer.min_distance = 0.0
+    for name, value in rules.items():
+        setattr(layer, name, value)
+    for _ in range(2):
+        _ops().duplicate_layer()
+    assert _ops().update_layers() == {'FINISHED'}
+    made = [one.made for one in _group().layers]
+    assert min(made) > 0.7 * max(made) > 0
+    places = {tuple(round(c, 4) for c in o.location) for o in bpy.context.scene.objects if o.tetflora.is_plant}
+    assert len(places) == sum(made)
+
+
 def test_update_grows_what_is_due_and_nothing_else():
     first, _ = _scatter("A", 5), _scatter("B", 6)
     first = _group().layers[0]

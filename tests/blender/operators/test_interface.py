@@ -10,7 +10,7 @@ import pytest
 
 from devtools import interface
 from devtools.layouts import Layout
-from panels import layers
+from panels import base, layers
 from tests.blender.scenes import add_mesh, select
 from tetflora_addon.blender.biomes.layers import active_layer
 from tetflora_addon.blender.geodata.origin import KEY
@@ -98,6 +98,13 @@ def test_the_line_below_the_list_of_layers_is_not_cut(message):
     blf.size(0, 11)
     assert len(said) == 4
     assert {text for text in said if blf.dimensions(0, text)[0] > 206.0} == set()
+
+
+@pytest.mark.parametrize(("width", "scale"), [(700, 1.0), (1000, 1.0), (1000, 1.4), (4000, 2.0)])
+def test_a_gallery_is_as_wide_as_its_window_at_most(width, scale):
+    """With its margins, 26 pixels: measured in the window."""
+    found = base.gallery_scale(width, scale)
+    assert (8 * 20.0 * found + 26.0) * scale < width and 2.0 < found <= base.GALLERY
 
 
 def test_the_sidebar_stays_short():

@@ -249,6 +249,7 @@ def test_soil_is_browner_under_trees_and_greener_in_the_light():
     west, east = rgba[:, : columns // 3].mean(axis=(0, 1)), rgba[:, -columns // 4 :].mean(axis=(0, 1))
     assert east[3] > west[3] + 0.05
     assert west[0] - west[1] > east[0] - east[1]  # redder than green where litter lies
+    assert max(material.diffuse_color[:3]) >= 0.5  # Solid shading has no sun: soil would be nearly black
     # The map lies over the ground.
     nodes = material.node_tree.nodes
     assert [s.default_value for s in nodes["Soil Corner"].inputs][:2] == pytest.approx([-15.0, -15.0])

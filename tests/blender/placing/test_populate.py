@@ -115,7 +115,7 @@ def test_a_full_terrain_takes_no_more_and_says_why():
 
 
 def test_by_density_chance_brings_some_too_close_and_no_room_is_not_the_reason():
-    placed = _place(SQUARE * 10.0, by_density=True, density=0.03, min_distance=1.8)
+    placed = _place(SQUARE * 10.0, by_density=True, density=0.5, min_distance=1.8)
     assert 0 < len(placed) < placed.wanted
     assert "no room" not in placed.reason
     assert "closer than the Min Distance of 1.8 m" in placed.reason

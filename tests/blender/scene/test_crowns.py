@@ -43,6 +43,18 @@ def test_a_panel_does_not_wait(window: list, monkeypatch: pytest.MonkeyPatch) ->
     assert crowns.crown_to_draw(scene, "rowan") == crowns.crown_for(scene, "rowan") == crown_of(species)
 
 
+def test_an_estimate_gets_crowns_whose_leaves_are_prepared(window: list, monkeypatch: pytest.MonkeyPatch) -> None:
+    """How finely leaves may be drawn takes longer than the crown; a window stood still for it."""
+    species = replace(species_for(None, "rowan"), name="Compiled, but not prepared")
+    monkeypatch.setattr(crowns, "species_for", lambda *_: species)
+    crown_of(species)
+    scene = bpy.context.scene
+    assert crowns.crown_to_draw(scene, "rowan") is not None
+    assert crowns.crown_to_draw(scene, "rowan", prepared=True) is None
+    look(window)
+    assert crowns.crown_to_draw(scene, "rowan", prepared=True) == crown_of(species)
+
+
 def test_what_cannot_be_compiled_is_guessed(window: list, monkeypatch: pytest.MonkeyPatch) -> None:
     def fails(_: object) -> None:
         raise SpeciesError("an object for a leaf")

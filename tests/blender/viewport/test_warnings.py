@@ -12,6 +12,7 @@ import pytest
 
 from panels import refine
 from tests.blender.scenes import add_camera, add_mesh, add_plant, select
+from tetflora_addon.blender import runtime
 from tetflora_addon.blender.compat import shader_tree
 from tetflora_addon.blender.placing import populations
 from tetflora_addon.blender.viewport import warnings
@@ -95,6 +96,39 @@ def test_the_camera_steps_out_of_a_crown_and_its_range_reaches_all_plants():
     _mend("clip")
     assert scene.camera.data.clip_end > 300.0
     assert far.location.y == 300.0
+
+
+def test_crowns_of_a_field_count_and_are_asked_for_by_species(monkeypatch):
+    """Not by plant: ground cover has thousands around the camera, and looking took seconds after each change."""
+    select(add_mesh("ground", size=16.0))
+    bpy.ops.tetflora.populate(count=400, min_distance=0.0, species="bush:3, fern", as_field='FIELD')
+    asked, crown_to_draw = [], warnings.crown_to_draw
+    monkeypatch.setattr(warnings, "crown_to_draw", lambda scene, kind: asked.append(kind) or crown_to_draw(scene, kind))
+    field = next(o for o in bpy.data.objects if o.tetflora.is_field)
+    bush = next(n for n, one in enumerate(field.data.attributes["species"].data) if one.value == 0)
+    foot = field.data.vertices[bush].co
+    add_camera(location=(foot.x, foot.y, 0.5))
+    assert "crown" in _keys()
+    assert sorted(asked) == ["bush", "fern"]
+    bpy.context.scene.camera.location.z = 10.0
+    assert "crown" not in _keys()
+
+
+def test_a_slow_first_look_does_not_delay_the_next(monkeypatch):
+    clock, waits = [0.0], []
+    monkeypatch.setattr(runtime, "time", SimpleNamespace(perf_counter=lambda: clock[0]))
+    monkeypatch.setattr(runtime, "call_soon", lambda _function, seconds: waits.append(seconds))
+    monkeypatch.setattr(runtime, "bpy", SimpleNamespace(app=SimpleNamespace(background=False), context=bpy.context))
+    takes = iter((1.5, 0.01, 0.01, 2.0, 2.0, 0.0))
+
+    def find(_scene, _layer):
+        clock[0] += next(takes)
+
+    outlook = runtime.Outlook(find)
+    for _ in range(6):
+        outlook.ask()
+        outlook._look()
+    assert waits == pytest.approx([0.2, 0.2, 0.3, 0.3, 0.3, 60.0])
 
 
 def test_grounds_that_are_small_or_scaled_are_mended():

@@ -68,7 +68,7 @@ def expected() -> list[Any]:
     """Crowns, and what is expected before anything is refined."""
     crowns = tuple(map(crown_of, species()))
     which, foot = np.arange(9) % 2, support.grove(9, 1.8).position
-    stand = Stand(9, foot, np.ones(9), which, crowns)
+    stand = Stand(np.ones(9), foot, np.ones(9), which, crowns)
     figures = [
         estimate(stand, view(kind), RefinementSettings(), 1e9, np.inf, everything)
         for kind in ("PERSP", "ORTHO", "PANO")

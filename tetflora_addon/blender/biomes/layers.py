@@ -138,6 +138,8 @@ def _copy_one(scene: bpy.types.Scene, uid: str, grounds: Sequence[bpy.types.Obje
     for key in ("kind", "source", "data", *BIOME_ONLY):
         setattr(new, key, getattr(source, key))
     set_grounds(new, [e.object for e in source.grounds] if grounds is None else grounds)
+    if grounds is None:  # where the plants of the original stand there is no room
+        new.seed = max(one.seed for one in layers) % (2**31 - 1) + 1
     # A cover lies under the copy of what it lay under, or under that itself.
     new.covers = biome if source.covers == source.biome else source.covers
     new.biome = biome or (source.biome if grounds is None else "")

@@ -9,7 +9,7 @@ it. A picture has the file's name and lies beside it.
 import time
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import partial
+from functools import cache, lru_cache, partial
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +17,7 @@ import bpy
 
 from ...errors import NAME, SceneError, readable
 from ...files import is_identifier, is_regular, parse_json, read_whole
+from ...species.catalog import stamp
 from ..declare import HIDDEN, once, string
 from ..file_library import ENDING, MAX_FILE_BYTES, OwnFiles, Pictures
 from ..preferences import own_species_folder, species_folders
@@ -70,6 +71,7 @@ class BiomeInfo:
         return self.path.parent != builtin_folder()
 
 
+@cache
 def builtin_folder() -> Path:
     """Folder of the biomes that are shipped."""
     return Path(__file__).resolve().parent.parent.parent / FOLDER
@@ -90,12 +92,13 @@ def biomes() -> dict[str, BiomeInfo]:
         for folder in (builtin_folder(), *reversed(_own_folders())):
             for path in sorted(folder.glob("*" + ENDING)) if folder.is_dir() else ():
                 if is_identifier(path.stem) and is_regular(path):
-                    found[path.stem] = _info(path)
+                    found[path.stem] = _info(path, stamp(path))
         _seen = now, dict(sorted(found.items(), key=lambda item: item[1].name.lower()))
     return _seen[1]
 
 
-def _info(path: Path) -> BiomeInfo:
+@lru_cache(maxsize=256)
+def _info(path: Path, _stamp: tuple[int, int]) -> BiomeInfo:
     try:
         data = parse_json(read_whole(path, MAX_FILE_BYTES))
     except (OSError, ValueError):

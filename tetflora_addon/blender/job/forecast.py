@@ -6,7 +6,6 @@ Plants are counted, some of them looked at, and figures computed a moment after 
 often than a few hundredths of the time allow; never while a panel is drawn.
 """
 
-import time
 from contextlib import suppress
 from dataclasses import dataclass, replace
 
@@ -37,18 +36,15 @@ from ..species.edits import display_height, species_for
 from .contents import check_settings, memory_left, picture_bytes, settings_from
 
 _LOOKED_AT = 2_000  # plants of each kind of storage that stand for all
-_PATIENCE = 30.0  # times that counting took before plants are counted again
 _GIGA, _MEGA = memory.GIGABYTE, 1e6
 
 
 @dataclass
 class _Counted:
-    """The stand of one view layer, when it was counted, and how long that took."""
+    """The stand of one view layer, and whether that has changed."""
 
     layer: tuple[str, str] | None = None
     stand: Stand | None = None
-    at: float = 0.0
-    took: float = 0.0
     stale: bool = True
 
 
@@ -65,7 +61,7 @@ def forecast(scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer) -> Estimat
     if depsgraph is None or scene.camera is None:
         return None
     stand = _stand_of(scene, view_layer)
-    if stand is None or not stand.number:
+    if stand is None or not len(stand.number):
         return None
     try:
         check_settings(scene)
@@ -129,12 +125,9 @@ def polygons_text(number: float) -> str:
 
 
 def _stand_of(scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer) -> Stand | None:
-    layer, now = (scene.session_uid, view_layer.name), time.perf_counter()
-    waits = now - _counted.at < _PATIENCE * _counted.took
-    if _counted.stand is None or _counted.layer != layer or (_counted.stale and not waits):
+    layer = scene.session_uid, view_layer.name
+    if _counted.stand is None or _counted.layer != layer or _counted.stale:
         _counted.stand, _counted.layer, _counted.stale = _count(scene, view_layer), layer, False
-        _counted.at = time.perf_counter()
-        _counted.took = _counted.at - now
     return _counted.stand
 
 
@@ -155,15 +148,12 @@ def _count(scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer) -> Stand | N
                 parts.append(_plants(scene, within, np.array(obj.matrix_world)))
     if single:
         parts.append(_plants(scene, single, np.eye(4)))
-    crowns: dict[str, Crown | None] = {}
-    rows = []
-    for number, foot, scale, species in parts:
-        for identifier in set(species) - crowns.keys():
-            crowns[identifier] = crown_to_draw(scene, identifier)
-        if None in crowns.values():
-            return None
-        index = {identifier: i for i, identifier in enumerate(crowns)}
-        rows.append((number, foot, scale, np.array([index[identifier] for identifier in species], dtype=np.int64)))
+    kinds = dict.fromkeys(kind for *_, species in parts for kind in species)
+    crowns = {kind: crown_to_draw(scene, kind, prepared=True) for kind in kinds}
+    if None in crowns.values():
+        return None
+    index = {kind: i for i, kind in enumerate(crowns)}
+    rows = [(*sizes, np.array([index[kind] for kind in species], dtype=np.int64)) for *sizes, species in parts]
     left = [replace(c, parts=c.parts.with_leaves(_in_leaf(scene, identifier))) for identifier, c in crowns.items()]
     return _merged(rows, tuple(left))
 
@@ -182,18 +172,17 @@ def _in_leaf(scene: bpy.types.Scene, kind: str) -> float:
 
 
 def _merged(rows: list[tuple[int, Floats, Floats, Integers]], crowns: tuple[Crown, ...]) -> Stand:
-    """Samples of all parts as one, in which each part has the weight of its plants."""
-    whole = sum(number for number, *_ in rows)
-    found: list[tuple] = [(np.zeros((0, 3)), np.zeros(0), np.zeros(0, np.int64))]
+    """Samples of all parts as one, of each by the root of its number: a few trees show more than much grass."""
+    found: list[tuple] = [(np.zeros(0), np.zeros((0, 3)), np.zeros(0), np.zeros(0, np.int64))]
+    whole = sum(np.sqrt(number) for number, *_ in rows)
     for number, *values in rows:
-        wanted = max(round(_LOOKED_AT * number / whole), 1) if whole > _LOOKED_AT else number
-        chosen = np.linspace(0, len(values[0]) - 1, wanted).round().astype(np.int64)
-        found.append(tuple(one[chosen] for one in values))
-    return Stand(whole, *map(np.concatenate, zip(*found, strict=True)), crowns)
+        chosen = _some(len(values[0]), max(round(_LOOKED_AT * np.sqrt(number) / whole), 1))
+        found.append((np.full(len(chosen), number / len(chosen)), *(one[chosen] for one in values)))
+    return Stand(*map(np.concatenate, zip(*found, strict=True)), crowns)
 
 
-def _some(number: int) -> Integers:
-    return np.linspace(0, number - 1, min(number, _LOOKED_AT)).round().astype(np.int64)
+def _some(number: int, most: int = _LOOKED_AT) -> Integers:
+    return np.linspace(0, number - 1, min(number, most)).round().astype(np.int64)
 
 
 def _plants(
@@ -228,11 +217,11 @@ def _field(scene: bpy.types.Scene, obj: bpy.types.Object, there: Integers) -> tu
     chosen = there[_some(number)]
     matrix = np.array(obj.matrix_world, dtype=np.float64)
     foot = read(obj.data, "position")[chosen].astype(np.float64) @ matrix[:3, :3].T + matrix[:3, 3]
-    scale, species, tall = (_stored(obj.data, name, chosen) for name in ("scale", "species", HEIGHT))
+    scale, species, tall = (stored(obj.data, name, chosen) for name in ("scale", "species", HEIGHT))
     own = np.cbrt(abs(np.linalg.det(matrix[:3, :3])))
     scale = own * (np.ones(len(chosen)) if scale is None else scale)
     which = np.zeros(len(chosen), np.int64) if species is None else np.clip(species, 0, len(kinds) - 1).astype(np.int64)
-    ages = next((a for n in (PREFIX + AGE, AGE) if (a := _stored(obj.data, n, chosen)) is not None), None)
+    ages = next((a for n in (PREFIX + AGE, AGE) if (a := stored(obj.data, n, chosen)) is not None), None)
     ages = np.full(len(chosen), obj.tetflora.age) if ages is None else ages
     if tall is not None:
         known = np.isfinite(tall) & (tall > 0.0)
@@ -253,7 +242,7 @@ def _ages_of(scene: bpy.types.Scene, kinds: list[str], which: Integers, tall: ND
     return out
 
 
-def _stored(points: bpy.types.Mesh | bpy.types.PointCloud, name: str, chosen: Integers) -> NDArray | None:
+def stored(points: bpy.types.Mesh | bpy.types.PointCloud, name: str, chosen: Integers) -> NDArray | None:
     """An attribute of some points that is a number each; None where there is none."""
     attribute = points.attributes.get(name)
     if attribute is None or attribute.domain != 'POINT' or attribute.data_type not in {'FLOAT', 'INT'}:

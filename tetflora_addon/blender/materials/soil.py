@@ -22,6 +22,7 @@ MARK = "tetflora_soil"
 #: How bright low plants are together, of how bright one blade is: they shade each other.
 SHADED = 0.72
 _PLACE, _SIZE, _MAP, _GREEN = "Soil Corner", "Soil Size", "Soil Map", "Soil Green"
+_SHOWN = 0.6  # of the brightest channel of soil in Solid shading, at least
 
 
 def is_soil(material: bpy.types.Material | None) -> bool:
@@ -89,7 +90,9 @@ def soil_material(
         if material is None:
             material = bpy.data.materials.new(name)
             material[MARK] = True
-        material.diffuse_color = (*(float(c) for c in colors.mean(axis=(0, 1))), 1.0)
+        # Solid shading has neither sun nor exposure: dark soil, which is nearly black there, is as bright as leaves.
+        mean = colors.mean(axis=(0, 1))
+        material.diffuse_color = (*(mean * max(_SHOWN / max(float(mean.max()), 1e-6), 1.0)).tolist(), 1.0)
         graph = Graph(shader_tree(material))
         _build(graph)
         graph.arrange()

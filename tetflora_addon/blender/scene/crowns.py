@@ -29,6 +29,7 @@ _SOON = 0.05  # seconds between two looks at crowns that are being found
 _wanted: list[Species] = []
 _finding: list[Job] = []  # at most one
 _without: set[Species] = set()  # an object for a leaf
+_prepared: set[Species] = set()
 
 
 def crown_for(scene: bpy.types.Scene, kind: str) -> Crown:
@@ -40,14 +41,17 @@ def crown_for(scene: bpy.types.Scene, kind: str) -> Crown:
         return _guess(species_of(kind))
 
 
-def crown_to_draw(scene: bpy.types.Scene, kind: str) -> Crown | None:
-    """The same for a panel, without waiting: None where it is only being looked for; the window is then drawn again."""
+def crown_to_draw(scene: bpy.types.Scene, kind: str, prepared: bool = False) -> Crown | None:
+    """The same for a panel, without waiting: None where it is only being looked for; the window is then drawn again.
+
+    prepared: how finely its leaves may be drawn has to be known as well.
+    """
     species = _found(scene, kind)
     if _in_background() or isinstance(species, Crown):
         return crown_for(scene, kind)
     if species in _without:
         return _guess(species_of(kind))
-    known = known_crown(species)
+    known = None if prepared and species not in _prepared else known_crown(species)
     if known is None:
         if species not in _wanted:
             _wanted.append(species)
@@ -92,6 +96,8 @@ def _find_all(species: Iterable[Species], find: Callable[[Species], object]) -> 
     for one in species:
         try:
             find(one)
+            if find is prepare:
+                _prepared.add(one)
         except SpeciesError:
             _without.add(one)
 

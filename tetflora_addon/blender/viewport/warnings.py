@@ -16,6 +16,7 @@ from mathutils import Matrix, Vector
 
 from ...arrays import Floats
 from ...species.kinds import species_of
+from ..job.forecast import stored
 from ..job.render import render_errors
 from ..placing.plant_objects import plants_of, positions
 from ..results.proxy_kinds import few_bounces
@@ -153,31 +154,36 @@ def _fields(scene: bpy.types.Scene) -> Iterator[tuple[bpy.types.Object, Floats]]
             yield field, positions(field)
 
 
-def _crowns(scene: bpy.types.Scene, at: Floats) -> list[tuple[Floats, float, float]]:
-    """Feet, radii and heights of plants near a place, as far as their crowns are known."""
-    near = [
-        (np.array(o.matrix_world.translation), o.tetflora.species, o.matrix_world.median_scale)
-        for o in plants_of(scene.objects)
-        if o.tetflora.enabled and (o.matrix_world.translation.xy - Vector(at[:2])).length < _NEAR
-    ]
+def _crowns(scene: bpy.types.Scene, at: Floats) -> tuple[Floats, Floats]:
+    """Feet (n, 3), and radii and heights (n, 2), of plants near a place, meters; sizes are 0 of unknown crowns."""
+    found: list[tuple] = []  # feet, species, which of these each is, and scales
+    for obj in plants_of(scene.objects):
+        foot = obj.matrix_world.translation
+        if obj.tetflora.enabled and (foot.xy - Vector(at[:2])).length < _NEAR:
+            found.append((np.array([foot]), [obj.tetflora.species], [0], obj.matrix_world.median_scale))
     for field, own in _fields(scene):
-        names, mesh = [species_of(kind) for kind in field_kinds(field)], field.data
-        for n in np.flatnonzero(np.linalg.norm(own[:, :2] - at[:2], axis=1) < _NEAR).tolist():
-            stored = (mesh.attributes[a].data[n] if a in mesh.attributes else None for a in ("species", "scale"))
-            number, scale = (float(getattr(one, "value", 0.0)) for one in stored)
-            near += [(own[n], names[min(int(number), len(names) - 1)], scale or 1.0)] if names else []
-    crowns = ((foot, crown_to_draw(scene, species), scale) for foot, species, scale in near)
-    return [(foot, crown.radius * scale, crown.height * scale) for foot, crown, scale in crowns if crown is not None]
+        near = np.flatnonzero(np.linalg.norm(own[:, :2] - at[:2], axis=1) < _NEAR)
+        if len(names := [species_of(kind) for kind in field_kinds(field)]) and len(near):
+            which, scale = (stored(field.data, name, near) for name in ("species", "scale"))
+            which = np.clip(np.zeros(len(near)) if which is None else which, 0, len(names) - 1).astype(np.int64)
+            found.append((own[near], names, which, 1.0 if scale is None else scale))
+    crowns = {name: crown_to_draw(scene, name) for name in {name for _, names, *_ in found for name in names}}
+    size = {name: (0.0, 0.0) if crown is None else (crown.radius, crown.height) for name, crown in crowns.items()}
+    feet, sizes = [np.zeros((0, 3))], [np.zeros((0, 2))]
+    for foot, names, which, scale in found:
+        feet.append(foot)
+        sizes.append(np.array([size[name] for name in names])[which] * np.reshape(scale, (-1, 1)))
+    return np.concatenate(feet), np.concatenate(sizes)
 
 
 def _camera(scene: bpy.types.Scene, place: Floats) -> Iterator[Warned]:
     camera = scene.camera
     at = np.array(camera.matrix_world.translation)
-    crowns = _crowns(scene, at)
-    if any(_holds(at, *one) for one in crowns):
+    feet, sizes = _crowns(scene, at)
+    if _within(at, feet, sizes):
         text = f'"{camera.name}" is inside a crown: leaves fill the picture. Move takes it to the nearest open place'
         yield Warned("crown", "In a crown", text, "Move", _step_out)
-    above = sum(radius**2 for foot, radius, height in crowns if foot[2] + height > at[2] + _OVERHEAD)
+    above = (sizes[:, 0] ** 2).sum(where=feet[:, 2] + sizes[:, 1] > at[2] + _OVERHEAD)
     if above > _NEAR**2 and scene.view_settings.exposure == 0.0:
         text = "The camera is in a closed wood, which is dark inside. Brighten raises Exposure in Color Management"
         yield Warned("shade", "Dark wood", text, "Brighten", _setter("view_settings.exposure", 2.5))
@@ -204,12 +210,12 @@ def cut_off(scene: bpy.types.Scene, place: Floats | None = None) -> tuple[str, f
     return text if beyond else "", float(depth.max())
 
 
-def _holds(at: Floats, foot: Floats, radius: float, height: float) -> bool:
+def _within(at: Floats, feet: Floats, sizes: Floats) -> bool:
     """Whether a place is within a crown, as far as eyes mind: not at its rim, and not under it beside the trunk."""
-    away, up = np.linalg.norm(at[:2] - foot[:2]), at[2] - foot[2]
-    if not 0.0 <= up <= height:
-        return False
-    return bool(away < (0.6 * radius if up > 0.25 * height or height < 4.0 else 0.08 * radius))
+    (radius, height), up = sizes.T, at[2] - feet[:, 2]
+    away = np.linalg.norm(at[:2] - feet[:, :2], axis=1)
+    reach = np.where((up > 0.25 * height) | (height < 4.0), 0.6, 0.08) * radius
+    return bool(((up >= 0.0) & (up <= height) & (away < reach)).any())
 
 
 def open_place(scene: bpy.types.Scene, at: Floats) -> Floats:
@@ -218,7 +224,7 @@ def open_place(scene: bpy.types.Scene, at: Floats) -> Floats:
     for away in np.arange(0.0, _NEAR, 0.5):
         for angle in np.linspace(0.0, 2.0 * np.pi, 16, endpoint=False):
             there = at + away * np.array([np.cos(angle), np.sin(angle), 0.0])
-            if not any(_holds(there, *one) for one in crowns):
+            if not _within(there, *crowns):
                 return there
     return at
 
