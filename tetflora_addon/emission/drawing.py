@@ -253,19 +253,11 @@ class _Tile:
         ]
         coarser = float(np.sqrt(max(self._asked / max(self._drawn, 1.0), 1.0)))
         owners = sorted({one for one, _ in self._facets}, key=lambda one: (one[0] is None, one[0] or 0, one[1]))
-        facets = [
-            Parts(
-                whose[0],
-                tuple(
-                    (joined(self._facets.pop((whose, seen))), seen)
-                    for seen in (True, False)
-                    if (whose, seen) in self._facets
-                ),
-                whose[1],
-                coarser,
-            )
-            for whose in owners
-        ]
+        facets = []
+        for whose in owners:
+            there = [seen for seen in (True, False) if (whose, seen) in self._facets]
+            own = tuple((joined(self._facets.pop((whose, seen))), seen) for seen in there)
+            facets.append(Parts(whose[0], own, whose[1], coarser))
         return [*blocks, *facets, *self.frontier.shown]
 
     def draw(self, parts: Sequence[Arrays], share: float, most: float) -> None:
@@ -275,7 +267,7 @@ class _Tile:
             self.add_shown(given.occluders)
         for slabs in frontier.slabs(parts, _SLAB * most):
             times, before = self._coarser(most), self.number
-            frontier.coarsen(times * given.facet, [kind.coarser(times) for kind in given.kinds])
+            frontier.facet, frontier.kinds = times * given.facet, [kind.coarser(times) for kind in given.kinds]
             for number, (kind, slab) in enumerate(zip(frontier.kinds, slabs, strict=True)):
                 if self.number > _FULL * most:
                     frontier.hidden[number].append(slab)

@@ -148,7 +148,7 @@ class Frontier:
     kinds : sequence of FrontierKind
     coverage : Coverage
     facet : float
-        Side of facets, pixels.
+        Side of facets, pixels; it and the kinds may change on the way to what is coarser.
 
     Attributes
     ----------
@@ -162,10 +162,6 @@ class Frontier:
         self.hidden: list[list[Waiting]] = [[] for _ in kinds]
         self.outside: list[list[Waiting]] = [[] for _ in kinds]
         self.shown: list[Shown] = []
-
-    def coarsen(self, facet: float, kinds: Sequence[FrontierKind]) -> None:
-        """Go on with facets of another side, pixels, and with kinds that draw less as it is."""
-        self.facet, self.kinds = facet, kinds
 
     def pool(self, kind: FrontierKind, parts: Arrays) -> Waiting:
         """Parts (n,) of a kind with spheres around them."""
