@@ -271,6 +271,7 @@ class _Tile:
             for number, (kind, slab) in enumerate(zip(frontier.kinds, slabs, strict=True)):
                 if self.number > _FULL * most:
                     frontier.hidden[number].append(slab)
+                    self._asked += float(slab.count.sum())  # the sides that are told are those of all that is seen
                 elif len(slab):
                     side = kind.larger * frontier.facet * given.camera.extent_around(slab.center)
                     kind.draw(self, slab, side, frontier.shown)
