@@ -9,7 +9,8 @@
     python -m benchmarks exact --sheet             # docs/images/exact.jpg of the windows that are there
 
 Plants have one of `SEEDS` seeds a species, by their places, so that the truth is so many expanded meshes a species as
-instances. Each picture is made in a process of its own, so that the largest memory is its own. Truths are kept in
+instances. Those have leaves as they are seen from afar: at eye height plants around the eye are expanded one by one, as
+finely as they are seen. Each picture is made in a process of its own, so that the largest memory is its own. Truths are kept in
 ``out/exact/truth`` by a digest of all that they follow from. Nothing is denoised. Needles are many: the truth of eight
 spruces takes some 12 GB, that of two (``--seeds 2``) 3.7 GB; facets of equal plants may differ in size (`equal_seeds`).
 
@@ -43,11 +44,15 @@ from numpy.typing import NDArray
 from devtools.formats import set_format
 from tetflora_addon.blender.biomes import adding, files, library
 from tetflora_addon.blender.job import refine
-from tetflora_addon.blender.job.contents import read_scene
+from tetflora_addon.blender.job.contents import compile_for, in_year, read_scene
 from tetflora_addon.blender.materials import snow
+from tetflora_addon.blender.results.leaf_objects import materials_of
+from tetflora_addon.blender.results.meshes import write_mesh
 from tetflora_addon.blender.results.output import KIND, result_collections
+from tetflora_addon.blender.scene.camera import read_camera
 from tetflora_addon.blender.scene.fields import fields_of
 from tetflora_addon.blender.worker import run_to_end
+from tetflora_addon.emission.plants import expanded_blocks
 from tetflora_addon.growth.hashing import child_key, key_of_seed
 
 from . import forest
@@ -84,6 +89,8 @@ COVERED, COVERAGE_SAMPLES = 0.05, 8
 #: Attributes of faces: the root of the area in meters, and which of `KINDS`.
 _SIDE, _KIND = "exact_side", "exact_kind"
 _DAY = 20.0
+#: Plants that a truth expands one by one are nearer than this at eye height, meters.
+_AROUND = 17.0
 #: Exposure inside the wood, stops.
 _INSIDE = 3.0
 #: Height of the eye in biomes, meters.
@@ -502,15 +509,30 @@ def truth(scene: bpy.types.Scene, spec: dict, folder: Path) -> dict[str, float]:
     """Instances in place of all plants, rendered with two seeds of noise; seconds and memory."""
     figures: dict[str, float] = {"planted": build(scene, spec)}
     forget_peak()
-    figures |= {f"instances_{k}": v for k, v in forest.build_instances(scene, spec["seeds"], own=True).items()}
-    wood = scene.objects["Wood"]
-    wood[KIND] = "truth"  # not one of those that are holes where plants are not
+    around = _AROUND if spec["case"] == "eye" else 0.0
+    built = forest.build_instances(scene, spec["seeds"], own=True, away=around)
+    figures |= {f"instances_{name}": value for name, value in built.items()}
+    for obj in [scene.objects["Wood"], *_expand(scene, around)]:
+        obj[KIND] = "truth"  # not one of those that are holes where plants are not
     snow.fit(bpy.data.materials)
     figures["instances_render_s"] = timed_render(scene, folder / "truth.png", spec["samples"], 0)
     figures["instances_peak_mb"] = peak_mb()
     timed_render(scene, folder / "again.png", spec["samples"], 1)
     _save_mask(folder / "covered.npy", coverage(scene, folder / "coverage.png", COVERAGE_SAMPLES))
     return figures
+
+
+def _expand(scene: bpy.types.Scene, around: float) -> Iterator[bpy.types.Object]:
+    """All polygons of the plants so near to the camera, meters, as finely as it sees them."""
+    depsgraph = bpy.context.evaluated_depsgraph_get()
+    camera, seeds = read_camera(scene, depsgraph), read_scene(scene, depsgraph).seeds
+    seeds = seeds.take(np.linalg.norm(seeds.position - camera.position, axis=1) < around)
+    flora = in_year(scene, compile_for(seeds.identifiers, scene, depsgraph))
+    for block in expanded_blocks(flora, seeds, camera):
+        materials = materials_of(scene, flora.species[block.species], block.kind, block.form)
+        made = bpy.data.objects.new("Near", write_mesh("Near", block.buffers, materials))
+        scene.collection.objects.link(made)
+        yield made
 
 
 def refined(scene: bpy.types.Scene, spec: dict, folder: Path, kept: Path) -> dict[str, float]:

@@ -422,11 +422,13 @@ def _render_seconds(scene: bpy.types.Scene, path: Path, samples: int) -> tuple[f
     return seconds, time.process_time() - processor
 
 
-def build_instances(scene: bpy.types.Scene, of_each: int = 0, own: bool = False) -> dict[str, float]:
+def build_instances(
+    scene: bpy.types.Scene, of_each: int = 0, own: bool = False, away: float = 0.0
+) -> dict[str, float]:
     """Put variants at the places of all plants of a scene; seconds, and polygons of the variants.
 
     So many of each species, or `VARIANTS` in all, each at random; ``own``: that of the plant's own seed, which must be
-    below their number.
+    below their number. Plants nearer to the camera than ``away`` meters are left out.
     """
     start = time.perf_counter()
     depsgraph = bpy.context.evaluated_depsgraph_get()
@@ -441,7 +443,8 @@ def build_instances(scene: bpy.types.Scene, of_each: int = 0, own: bool = False)
             mesh = plant_mesh(scene, name, flora.species[0], plant_parts(flora, single_seed(kind, one)))
             variants.objects.link(bpy.data.objects.new(name, mesh))
             polygons += len(mesh.polygons)
-    wood = bpy.data.objects.new("Wood", _places(seeds, each, own))
+    far = np.linalg.norm(seeds.position - np.array(scene.camera.matrix_world.translation), axis=1) >= away
+    wood = bpy.data.objects.new("Wood", _places(seeds.take(far), each, own))
     scene.collection.objects.link(wood)
     wood.modifiers.new("Instances", 'NODES').node_group = _variant_nodes(variants)
     bpy.context.view_layer.update()
