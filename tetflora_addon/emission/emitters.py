@@ -7,10 +7,12 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ..arrays import Floats
 from ..buffers import MeshBuffers, PointBuffers
 from ..camera.camera import Camera
 from ..compiled.flora import Flora
@@ -26,6 +28,7 @@ from ..proxies.primitives import (
     triangle_mesh,
     triangles_of,
 )
+from ..refinement.lights import sun_of
 from ..refinement.loop import Refinement
 from .asset_plan import AssetPlan, OriginalPolicy, explicit_plan
 from .drawing import Drawing, FacetConverter, Parts, drawn_blocks
@@ -116,8 +119,9 @@ class ProxyEmitter:
 
     #: Makes the buffers of a `EmissionInput`, for proxies that the renderer lights.
     blocks: Callable[[EmissionInput], Iterator[Buffers]]
-    #: Given the camera and `EmissionInput.disc`, what facets become where they are made; None in forms without facets.
-    form: Callable[[Camera, float], FacetConverter] | None = None
+    #: Given the camera, `EmissionInput.disc` and where the sun is, what becomes of facets where they are made; None in
+    #: forms without facets.
+    form: Callable[[Camera, float, Floats | None], FacetConverter] | None = None
     #: The same with baked light, given that light and the number of the first facet in its list of sheets. None:
     #: proxies of this form are always lit by the renderer.
     baked_blocks: Callable[[EmissionInput, BakedLight, int], Iterator[Buffers]] | None = None
@@ -148,27 +152,18 @@ class AsSpheres:
 
     camera: Camera
     disc: float
+    sun: Floats | None
     seen_too: bool
 
     def __call__(self, facets: Facets, seen: bool) -> Primitive:
         """Spheres or triangles."""
         if seen and not self.seen_too:
             return triangles_of(facets)
-        if seen:
-            return spheres_of(facets, self.camera, self.disc)
-        return spheres_of(facets, None, self.disc, self.camera.distance_to_view(facets.center) > 0.0)
+        return spheres_of(facets, self.camera if seen else None, self.disc, self.sun)
 
 
-def _triangles_everywhere(_camera: Camera, _disc: float) -> FacetConverter:
+def _triangles_everywhere(_camera: Camera, _disc: float, _sun: Floats | None) -> FacetConverter:
     return as_triangles
-
-
-def _spheres_everywhere(camera: Camera, disc: float) -> FacetConverter:
-    return AsSpheres(camera, disc, seen_too=True)
-
-
-def _spheres_where_hidden(camera: Camera, disc: float) -> FacetConverter:
-    return AsSpheres(camera, disc, seen_too=False)
 
 
 def facet_blocks(refined: EmissionInput) -> Iterator[Buffers]:
@@ -206,18 +201,18 @@ def _baked_facets(refined: EmissionInput, light: BakedLight, first_sheet: int) -
 
 
 def _baked_spheres(refined: EmissionInput, light: BakedLight, first_sheet: int) -> Iterator[PointBuffers]:
+    camera, sun = refined.camera, sun_of(refined.refinement.lights)
     for parts, facets, sheets in _numbered(refined, first_sheet):
-        camera = refined.camera
-        drawn = [spheres_of(some, camera if seen else None, refined.disc) for some, seen in parts]
+        drawn = [spheres_of(some, camera if seen else None, refined.disc, sun) for some, seen in parts]
         made, values = sphere_points(joined(drawn)), light.of_spheres(facets, sheets)
         baked = {name: array for name, (_, array) in baked_attributes('POINT', values).items()}
         yield replace(made, attributes={**made.attributes, **baked}, species=parts.species, look=parts.look)
 
 
 MICROSURFACES = ProxyEmitter(facet_blocks, _triangles_everywhere, _baked_facets)
-MICROSPHERES = ProxyEmitter(facet_blocks, _spheres_everywhere, _baked_spheres)
+MICROSPHERES = ProxyEmitter(facet_blocks, partial(AsSpheres, seen_too=True), _baked_spheres)
 #: Facets where they are seen, spheres elsewhere. Where light is baked, all are facets.
-AUTOMATIC = ProxyEmitter(facet_blocks, _spheres_where_hidden, _baked_facets)
+AUTOMATIC = ProxyEmitter(facet_blocks, partial(AsSpheres, seen_too=False), _baked_facets)
 #: Shells fill their tetrahedra evenly, so that hidden ones are divided as well; those that are seen further, because
 #: their shape shows.
 SHELLS = ProxyEmitter(shell_blocks, None, shell_blocks, faces=4.0, hidden_block=16.0, proxy_block=4.0)

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays import in_axes
-from ..refinement.lights import Light, frame_toward
+from ..refinement.lights import Light, frame_toward, sun_of
 
 #: Cells of the grid across the light along each side, and layers along it, at most.
 CELLS, LAYERS = 192, 64
@@ -37,9 +37,8 @@ class Shade:
     """
 
     def __init__(self, position: NDArray[np.floating], area: NDArray[np.floating], lights: Sequence[Light]) -> None:
-        suns = [light for light in lights if light.kind == "SUN" and light.shadow]
-        direction = max(suns, key=lambda one: float(np.mean(one.color))).direction if suns else _DOWN
-        self._frame = frame_toward(direction)
+        sun = sun_of(lights)
+        self._frame = frame_toward(_DOWN if sun is None else -sun)
         if not len(position):
             self._table = None
             return

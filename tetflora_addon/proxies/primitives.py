@@ -18,18 +18,18 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import Arrays, Floats, Mask
+from ..arrays import Arrays, Floats
 from ..buffers import MeshBuffers, PointBuffers
 from ..camera.camera import Camera
 from .microsurfaces import CIRCUMRADIUS, SIN_60, Facets
 
 #: Minimum fraction of a facet's area that its sphere covers, where the facet is seen from its edge.
 LEAST_COVER = 0.1
-#: Mean of |cos| over all directions.
-MEAN_COVER = 0.5
-#: The same for a level facet and an upright one over light that falls on level ground from an even sky: directions
-#: above, weighted by the cosine to the zenith.
+#: Mean of |cos| for a level facet and an upright one over light that falls on level ground from an even sky:
+#: directions above, weighted by the cosine to the zenith.
 LEVEL_COVER, UPRIGHT_COVER = 2.0 / 3.0, 4.0 / (3.0 * np.pi)
+#: Light of a clear sky on level ground, over that of the sun at the zenith.
+SKYLIGHT = 0.2
 
 
 @dataclass(frozen=True)
@@ -81,23 +81,21 @@ def triangles_of(facets: Facets) -> Triangles:
     return Triangles(triangle_corners(facets), *_shaded(facets))
 
 
-def spheres_of(facets: Facets, camera: Camera | None, disc: float = np.pi, outside: Mask | None = None) -> Spheres:
+def spheres_of(facets: Facets, camera: Camera | None, disc: float = np.pi, sun: Floats | None = None) -> Spheres:
     """A sphere for each facet.
 
     Parameters
     ----------
     facets : Facets of n
     camera : Camera or None
-        That for which each sphere covers what its facet covers. Without, it covers the mean of that over all
-        directions: for facets that only cast shadows and light up others.
+        That for which each sphere covers what its facet covers. Without, it covers what its facet covers for light
+        from above: for facets that only cast shadows and light up others.
     disc : float
         Area that a renderer draws for a sphere of radius 1; some draw fewer pixels than a circle has.
-    outside : (n,) bool, optional
-        Facets out of view, of which shadows on what lies below are seen: they cover the mean over light from above.
+    sun : (3,) float64, optional
+        Where the strongest sunlight comes from, a unit vector. Without, light comes from an even sky.
     """
-    cover = cover_of(facets, camera)
-    if outside is not None:
-        cover = np.where(outside, UPRIGHT_COVER + (LEVEL_COVER - UPRIGHT_COVER) * facets.normal[:, 2] ** 2, cover)
+    cover = cover_for_light(facets, sun) if camera is None else np.maximum(facing(facets, camera), LEAST_COVER)
     radius = facets.side * np.sqrt(cover / disc)
     return Spheres(facets.center.astype(np.float32), radius.astype(np.float32), *_shaded(facets))
 
@@ -152,11 +150,13 @@ def facet_mesh(facets: Facets) -> MeshBuffers:
     return triangle_mesh(triangles_of(facets))
 
 
-def cover_of(facets: Facets, camera: Camera | None) -> Floats:
-    """Fraction (n,) of a facet's area that its sphere covers; without a camera, the mean over all directions."""
-    if camera is None:
-        return np.full(len(facets), MEAN_COVER)
-    return np.maximum(facing(facets, camera), LEAST_COVER)
+def cover_for_light(facets: Facets, sun: Floats | None) -> Floats:
+    """Fraction (n,) of its area that each facet covers for the light of a sun and of the sky, by what each brings."""
+    cover = UPRIGHT_COVER + (LEVEL_COVER - UPRIGHT_COVER) * facets.normal[:, 2] ** 2
+    if sun is None or sun[2] <= 0.0:
+        return cover
+    direct = sun[2] / (sun[2] + SKYLIGHT)
+    return direct * np.abs(facets.normal @ sun) + (1.0 - direct) * cover
 
 
 def facing(facets: Facets, camera: Camera) -> Floats:

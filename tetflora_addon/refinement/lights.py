@@ -65,6 +65,12 @@ class Light:
         return replace(self, position=self.position - origin)
 
 
+def sun_of(lights: Sequence[Light]) -> Floats | None:
+    """Where the light of the brightest sun that casts shadows comes from, a unit vector (3,); None without any."""
+    suns = [light for light in lights if light.kind == "SUN" and light.shadow]
+    return -max(suns, key=lambda one: float(np.mean(one.color))).direction if suns else None
+
+
 def light_views(light: Light, vertices: Floats, points: Floats, resolution: int) -> list[Camera]:
     """Flat cameras through which a light sees what receives it.
 

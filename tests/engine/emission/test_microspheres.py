@@ -4,6 +4,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -14,7 +16,15 @@ from tetflora_addon.buffers import MeshBuffers, PointBuffers
 from tetflora_addon.camera.camera import Camera
 from tetflora_addon.emission.emitters import AsSpheres, as_triangles, facet_blocks
 from tetflora_addon.proxies.microsurfaces import Facets
-from tetflora_addon.proxies.primitives import LEAST_COVER, facet_mesh, facing, joined, sphere_points, spheres_of
+from tetflora_addon.proxies.primitives import (
+    LEAST_COVER,
+    SKYLIGHT,
+    facet_mesh,
+    facing,
+    joined,
+    sphere_points,
+    spheres_of,
+)
 
 EYE = np.array([2.0, -30.0, 4.0])
 
@@ -50,27 +60,34 @@ def test_what_a_facet_covers_for_the_camera_its_sphere_covers(kind: str) -> None
     assert discs(made.radius).sum() == pytest.approx(shown.sum(), rel=0.02)
 
 
-def test_what_nobody_sees_casts_the_same_shadow_on_average_over_all_lights() -> None:
-    facets = squares()
-    made = sphere_points(spheres_of(facets, None))
-    vectors = support.face_vectors(facet_mesh(facets))
-    lights = unit(np.random.default_rng(5).normal(size=(400, 3)))
-    shadow = np.abs(vectors[:300] @ lights.T).mean(axis=1)
-    assert discs(made.radius)[:300] == pytest.approx(shadow, rel=0.25)
-    assert discs(made.radius).sum() == pytest.approx((facets.side**2).sum() / 2, rel=1e-5)
-
-
-def test_what_is_out_of_view_casts_the_same_shadow_on_average_over_light_from_above() -> None:
-    """Of an even sky, as it falls on level ground. Leaves that lie level cast more than those that hang."""
-    facets = squares()
-    made = sphere_points(spheres_of(facets, None, outside=np.arange(len(facets)) < 300))
-    vectors = support.face_vectors(facet_mesh(facets))
-    across, around = np.random.default_rng(5).random((2, 4000))
+def skylight(number: int = 4000) -> np.ndarray:
+    """Directions from which an even sky lights level ground."""
+    across, around = np.random.default_rng(5).random((2, number))
     low, turn = np.sqrt(across), 2.0 * np.pi * around
-    lights = np.stack([low * np.cos(turn), low * np.sin(turn), np.sqrt(1.0 - across)], axis=1)
-    shadow = np.abs(vectors @ lights.T).mean(axis=1)
-    assert discs(made.radius)[:300] == pytest.approx(shadow[:300], rel=0.03)
-    assert discs(made.radius)[300:] == pytest.approx(facets.side[300:] ** 2 / 2, rel=1e-5)
+    return np.stack([low * np.cos(turn), low * np.sin(turn), np.sqrt(1.0 - across)], axis=1)
+
+
+def test_what_nobody_sees_casts_the_same_shadow_on_average_over_light_from_the_sky() -> None:
+    """Of an even one, as it falls on level ground. Leaves that lie level cast more than those that hang."""
+    facets = squares(3000)
+    vectors = support.face_vectors(facet_mesh(facets))
+    for sun in (None, np.array([0.6, 0.0, -0.8])):  # below the horizon
+        made = sphere_points(spheres_of(facets, None, sun=sun))
+        assert discs(made.radius) == pytest.approx(np.abs(vectors @ skylight().T).mean(axis=1), rel=0.03)
+
+
+@pytest.mark.parametrize("height", [12.0, 60.0, 90.0])
+def test_what_nobody_sees_casts_the_same_shadow_in_the_sun(height: float) -> None:
+    """A canopy of level leaves as spheres lets as much of the sun through as its leaves; the sky's light is a share."""
+    facets, up = squares(100), np.radians(height)
+    facets = replace(
+        facets, across=np.tile(np.eye(3)[0], (len(facets), 1)), along=np.tile(np.eye(3)[1], (len(facets), 1))
+    )
+    sun = np.array([np.cos(up), 0.0, np.sin(up)])
+    covered = discs(sphere_points(spheres_of(facets, None, sun=sun)).radius) / facets.side**2
+    direct = sun[2] / (sun[2] + SKYLIGHT)
+    assert covered == pytest.approx(direct * sun[2] + (1.0 - direct) * 2.0 / 3.0, rel=1e-5)
+    assert height < 30.0 or covered == pytest.approx(sun[2], rel=0.06)
 
 
 def test_places_and_looks_are_those_of_the_facets() -> None:
@@ -87,8 +104,8 @@ def test_a_refinement_has_a_sphere_for_each_facet() -> None:
     flora, _, view, result = scene()
     made = {}
     for name, form in (
-        ("all", AsSpheres(view, np.pi, True)),
-        ("hidden", AsSpheres(view, np.pi, False)),
+        ("all", AsSpheres(view, np.pi, None, True)),
+        ("hidden", AsSpheres(view, np.pi, None, False)),
         ("none", as_triangles),
     ):
         refined = support.refined(flora, result, view, form=form)

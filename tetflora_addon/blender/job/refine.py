@@ -34,6 +34,7 @@ from ...processes import pool
 from ...proxies.facet_weights import facet_weights, measuring, unmeasured
 from ...refinement import loop
 from ...refinement.decisions import Decision
+from ...refinement.lights import sun_of
 from ...refinement.loop import Refinement, step_of
 from ...refinement.settings import FIRST_LOOK, RefinementSettings
 from ...refinement.statistics import Statistics, Stopwatch
@@ -540,7 +541,7 @@ def _refined(run: _Run, disc: float) -> Job[EmissionInput]:
         how = bound.originals, detail.asset_limit, looks, detail.asset_larger
         clusters = PlacedClusters(refinement.assets.placed, camera, *how)
     # Light is baked for facets, whatever is made of them then.
-    becomes = None if run.baking is not None else form.form(camera, disc)
+    becomes = None if run.baking is not None else form.form(camera, disc, sun_of(refinement.lights))
     with_all = drawing(
         flora,
         refinement,
