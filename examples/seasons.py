@@ -112,6 +112,8 @@ _CHERRY_LEAVES = {
     "leaf_color_tip": [0.085, 0.135, 0.03],
 }
 _WOOD, _MARGIN = "wood", "edge"
+#: How much trees of the hill have grown as between others.
+_HABIT = 0.35
 
 
 def height(x: NDArray[np.float64], y: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -167,7 +169,8 @@ def _add_log(scene: bpy.types.Scene) -> None:
     from tetflora_addon.blender.placing.cover import fallen_from
     from tetflora_addon.blender.species.edits import species_data, store_species
 
-    store_species(scene, "birch_log", species_data(scene, fallen_from(scene, "oak", "log")))
+    for birch in ("birch", among_others(scene, "birch", _HABIT)):
+        store_species(scene, f"{birch}_log", species_data(scene, fallen_from(scene, "oak", "log")))
 
 
 def _ground(name: str, side: float, step: float, hole: float) -> bpy.types.Object:
@@ -187,7 +190,7 @@ def _plant(scene: bpy.types.Scene, ground: bpy.types.Object) -> None:
     from tetflora_addon.blender.worker import run_to_end
 
     for mask, mix, apart, density, sizes, habit in (
-        (_WOOD, _HILL, 3.2, 480.0, (0.6, 1.15), 0.35),
+        (_WOOD, _HILL, 3.2, 480.0, (0.6, 1.15), _HABIT),
         (_MARGIN, _EDGE, 1.5, 700.0, (0.45, 0.95), 0.0),
     ):
         some = populations.add_population(scene, [ground], name=f"{ground.name} {mask}")

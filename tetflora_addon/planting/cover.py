@@ -264,7 +264,7 @@ def covered(strata: Sequence[Stratum], cells: int) -> Floats:
 
 
 def tinted(strata: Sequence[Stratum], soil: Floats, cells: int) -> Floats:
-    """Mean linear RGB (cells, 3) of bare soil (3,) and what lies on it."""
+    """Mean linear RGB (cells, 3) of bare soil (3,) or (cells, 3) and what lies on it."""
     areas = [one.number * one.area * one.suits for one in strata]
     whole = sum(areas, np.full(cells, 1e-12))
     mean = sum((area[:, None] * one.color for area, one in zip(areas, strata, strict=True)), np.zeros((cells, 3)))

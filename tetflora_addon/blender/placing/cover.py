@@ -40,7 +40,7 @@ NAME, FALLEN_LEAVES = "Ground cover", "Fallen leaves"
 _SQUARE = 0.976  # mean square of the scales of a cover's plants
 #: What grows: species, habitat, plants on a square meter of ground that suits.
 GROWN = (
-    ("wood_grass", 'LIGHT', 9.0),
+    ("wood_grass", 'LIGHT', 16.0),
     ("grass", 'LIGHT', 0.25),
     ("flower", 'LIGHT', 0.15),
     ("fern", 'HALF_SHADE', 0.12),
@@ -58,8 +58,8 @@ ANYBODY = "plants"
 #: Fraction of the work after which plants are placed, and what is done before.
 _PLANTING, _UNDER = 0.7, "Light and litter under the plants"
 _PAGES = {**FALLEN, KIND: leaves_page}
-#: Soil without anything on it, linear RGB.
-HUMUS = np.array([0.036, 0.025, 0.016])
+#: Soil without anything on it, and dead grass between what grows in the light, in its shade; linear RGB.
+HUMUS, THATCH = np.array([0.036, 0.025, 0.016]), np.array([0.1, 0.08, 0.042])
 
 
 @dataclass(frozen=True)
@@ -271,7 +271,8 @@ def _lay_soil(
     colors = np.stack([one.color for one in growing] or [HUMUS])
     # Seen from above, a meadow is darker than its blades, which shade each other.
     tint = SHADED * (areas @ colors / max(areas.sum(), 1e-12))
-    earth = tinted(lying, HUMUS, cells).reshape(*shape, 3)
+    open_ = floor.map_of(Habitat.LIGHT, None)[:, None]
+    earth = tinted(lying, (1.0 - open_) * HUMUS + open_ * THATCH, cells).reshape(*shape, 3)
     return lay_soil(f"{cover.name} soil", grounds, earth, green.reshape(shape), tint, sheet.low, sheet.cell)
 
 
