@@ -422,9 +422,7 @@ def _render_seconds(scene: bpy.types.Scene, path: Path, samples: int) -> tuple[f
     return seconds, time.process_time() - processor
 
 
-def build_instances(
-    scene: bpy.types.Scene, of_each: int = 0, own: bool = False, away: float = 0.0
-) -> dict[str, float]:
+def build_instances(scene: bpy.types.Scene, of_each: int = 0, own: bool = False, away: float = 0.0) -> dict[str, float]:
     """Put variants at the places of all plants of a scene; seconds, and polygons of the variants.
 
     So many of each species, or `VARIANTS` in all, each at random; ``own``: that of the plant's own seed, which must be
