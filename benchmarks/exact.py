@@ -11,8 +11,8 @@
 Plants have one of `SEEDS` seeds a species, by their places, so that the truth is so many expanded meshes a species as
 instances. Those have leaves as they are seen from afar: at eye height plants around the eye are expanded one by one, as
 finely as they are seen. Each picture is made in a process of its own, so that the largest memory is its own. Truths are
-kept in ``out/exact/truth`` by a digest of all that they follow from. Nothing is denoised. Needles are many: the truth of
-eight spruces takes some 12 GB, that of two (``--seeds 2``) 3.7 GB; facets of equal plants may differ in size
+kept in ``out/exact/truth`` by a digest of all that they follow from. Nothing is denoised. Needles are many: the truth
+of eight spruces takes some 12 GB, that of two (``--seeds 2``) 3.7 GB; facets of equal plants may differ in size
 (`equal_seeds`).
 
 Beside the figures, ``out/exact`` gets ``sheet.png`` (truth, refined, FLIP) and ``blobs.png`` (refined; blobs that are

@@ -219,9 +219,14 @@ def among_others(scene: bpy.types.Scene, species: str, habit: float) -> str:
 
 
 def render(
-    path: Path, size: tuple[int, int] = SIZE, samples: int = SAMPLES, gray: float = _GRAY, beyond: float = 0.0
+    path: Path,
+    size: tuple[int, int] = SIZE,
+    samples: int = SAMPLES,
+    gray: float = _GRAY,
+    beyond: float = 0.0,
+    exposure: float | None = None,
 ) -> None:
-    """Refine for the camera and render; ``gray`` is the mean that the exposure aims at.
+    """Refine for the camera and render; ``gray`` is the mean that the exposure aims at, where none is given.
 
     What is beyond the border by a fraction of the picture is as fine as the rest, where plants stand close to the eye.
     """
@@ -237,13 +242,14 @@ def render(
     refine.refine(scene, bpy.context.evaluated_depsgraph_get())
     scene.camera.data.lens = lens
     scene.cycles.samples, scene.cycles.use_denoising = samples, True
-    scene.view_settings.exposure = 0.55
+    scene.view_settings.exposure = 0.55 if exposure is None else exposure
     scene.view_settings.look = 'AgX - Medium High Contrast'
     set_format(scene.render.image_settings, 'PNG')
     scene.render.filepath = str(path)
     bpy.ops.render.render(write_still=True)
-    scene.view_settings.exposure += metered(path, gray)
-    bpy.data.images["Render Result"].save_render(str(path), scene=scene)
+    if exposure is None:
+        scene.view_settings.exposure += metered(path, gray)
+        bpy.data.images["Render Result"].save_render(str(path), scene=scene)
 
 
 def metered(path: Path, gray: float) -> float:

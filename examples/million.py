@@ -38,7 +38,7 @@ from .seasons import Look, sky
 from .terrain import Terrain
 from .wood import grid
 
-PLANTS, WIDTH = 1_000_000, 960
+PLANTS, WIDTH = 1_000_000, 1600
 #: Relative numbers of species in the valleys and on the heights.
 VALLEYS = {"broadleaf_tree": 0.3, "oak": 0.1, "maple": 0.15, "birch": 0.1, "aspen": 0.1, "bush": 0.25}
 HEIGHTS = {"spruce": 0.45, "conifer": 0.3, "birch": 0.1, "bush": 0.15}
@@ -56,7 +56,7 @@ _AHEAD, _CLEAR = 52.0, 86.0
 _LAKE, _SHORE = 0.16, 3.0
 _LOOK = Look(
     200.0, 0.0, (19.0, -166.0), 6.0, (1.0, 0.80, 0.58),
-    ((0.98, 0.84, 0.68), (0.40, 0.57, 0.85), (0.08, 0.22, 0.52)), 0.8, 0.45, (0.00022, (0.54, 0.57, 0.64)), 0.40,
+    ((0.98, 0.84, 0.68), (0.40, 0.57, 0.85), (0.08, 0.22, 0.52)), 0.8, 0.45, (0.00022, (0.54, 0.57, 0.64)), 0.46,
 )  # fmt: skip
 #: Around the summit: species, seed, meters ahead and to the right, size.
 _NEAR = (

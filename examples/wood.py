@@ -44,7 +44,7 @@ LAND, NEAR = 800.0, 150.0
 #: Where the camera stands in the wood, and where it looks.
 _EYE, _AHEAD = (24.0, 22.0, 1.65), (38.0, 52.0, 3.6)
 #: Direction from the leaf to the camera.
-_TOWARD = np.array([0.16, -0.98, 0.12]) / np.linalg.norm([0.16, 0.98, 0.12])
+TOWARD = np.array([0.16, -0.98, 0.12]) / np.linalg.norm([0.16, 0.98, 0.12])
 _ELEVATION, _AZIMUTH = 38.0, 236.0
 _SKY = 0.9
 #: Mean of the picture of what is seen from afar, which lies in the sun, and from nearer.
@@ -152,7 +152,7 @@ def leaf_of_the_oak(scene: bpy.types.Scene) -> Vector:
     from tetflora_addon.species import catalog
 
     flora = compile_species([catalog.load_species("oak")])
-    return Vector(face_on_leaf(flora, "oak", _TOWARD, lowest=1.2)) + scene.objects["The oak"].location
+    return Vector(face_on_leaf(flora, "oak", TOWARD, lowest=1.2)) + scene.objects["The oak"].location
 
 
 def render_dolly(path: Path, size: tuple[int, int] = SIZE, samples: int = SAMPLES) -> None:
@@ -163,7 +163,7 @@ def render_dolly(path: Path, size: tuple[int, int] = SIZE, samples: int = SAMPLE
         cells = []
         for distance in DISTANCES:
             # A lens that shows the whole oak at 16 m, and a leaf at a hand's width.
-            aim(scene, leaf, leaf + Vector(_TOWARD * distance), 40.0)
+            aim(scene, leaf, leaf + Vector(TOWARD * distance), 40.0)
             cells.append((Path(folder) / f"{len(cells)}.png", f"{distance:.2g} m"))
             render(cells[-1][0], size, samples, gray=_WIDE if distance > NEAR else _CLOSER)
         save_sheet(cells, 4, path, _CELL)
