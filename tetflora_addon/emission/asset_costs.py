@@ -12,8 +12,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..arrays import Floats, Integers
 from .asset_plan import OriginalPolicy
 
 #: Bytes that Cycles takes for a triangle of an asset with its tree, and for an instance; what Blender takes for one.
@@ -34,10 +34,10 @@ NEVER = 2.0
 class AssetCosts:
     """What there is of each asset (a)."""
 
-    triangles: NDArray[np.int64]  # (a,)
-    instances: NDArray[np.int64]  # (a,)
+    triangles: Integers  # (a,)
+    instances: Integers  # (a,)
     #: (a,): pixels of the image that its instances would cover if nothing hid them; infinite where that is not known.
-    pixels: NDArray[np.float64]
+    pixels: Floats
 
     def plain(self, cycles: bool, left: float) -> bool:
         """Whether all instances are best left as they are, with so many bytes left."""
@@ -66,9 +66,9 @@ class AssetCosts:
         return OriginalPolicy(kept, NEVER, shared=True)
 
     @property
-    def _loaded(self) -> NDArray[np.float64]:
+    def _loaded(self) -> Floats:
         return CYCLES_TRIANGLE * self.triangles
 
     @property
-    def _of_instances(self) -> NDArray[np.float64]:
+    def _of_instances(self) -> Floats:
         return (CYCLES_INSTANCE + BLENDER_INSTANCE) * self.instances

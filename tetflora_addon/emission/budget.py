@@ -12,8 +12,8 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..arrays import Floats
 from ..camera.camera import Camera
 from ..refinement.decisions import Decision, contributions
 from ..refinement.loop import Refinement
@@ -139,7 +139,7 @@ def _fitted_shells(result: Refinement, allowed: float, faces: float) -> Refineme
     return replace(result, decision=decision)
 
 
-def _large(result: Refinement) -> NDArray[np.float64]:
+def _large(result: Refinement) -> Floats:
     """Polygons (cells,) that stay polygons although their cell is a proxy."""
     held = result.cell_polygons.polygons
     large = np.isinf(held.totals.width)

@@ -9,8 +9,8 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..arrays import Integers
 from ..buffers import MeshBuffers, PointBuffers
 from ..camera.camera import Camera
 from ..compiled.flora import Flora
@@ -191,7 +191,7 @@ def shell_blocks(
         yield shells
 
 
-def _numbered(refined: EmissionInput, first_sheet: int) -> Iterator[tuple[Parts, Facets, NDArray[np.int64]]]:
+def _numbered(refined: EmissionInput, first_sheet: int) -> Iterator[tuple[Parts, Facets, Integers]]:
     """Blocks of facets, each as parts and as one, with the sheets (n,) that they are in baked light."""
     for parts in refined.facet_parts():
         facets = joined([some for some, _ in parts])

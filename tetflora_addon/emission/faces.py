@@ -19,7 +19,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import Arrays, chunks, column, spread, unit
+from ..arrays import Arrays, Floats, Integers, Integers32, Mask, chunks, column, spread, unit
 from ..camera.camera import Camera
 from ..growth.hashing import child_key, key_of_seed, mix, stepped, uniform
 from ..proxies.microsurfaces import Facets
@@ -39,11 +39,11 @@ _PLACE_U, _PLACE_V = 222, 223
 class FaceRows(Arrays):
     """Faces of instances of meshes (n)."""
 
-    face: NDArray[np.int32] = column(dtype=np.int32)  # (n,)
-    instance: NDArray[np.int32] = column(dtype=np.int32)  # (n,)
-    center: NDArray[np.float64] = column(3)  # (n, 3)
-    reach: NDArray[np.float64]  # (n,): as of `Polygons`
-    optical: NDArray[np.float64]  # (n,): area that each blocks, m²
+    face: Integers32 = column(dtype=np.int32)  # (n,)
+    instance: Integers32 = column(dtype=np.int32)  # (n,)
+    center: Floats = column(3)  # (n, 3)
+    reach: Floats  # (n,): as of `Polygons`
+    optical: Floats  # (n,): area that each blocks, m²
 
     @classmethod
     def of(cls, whole: Polygons) -> FaceRows:
@@ -73,11 +73,11 @@ class Faces(FrontierKind):
         bare.surfaces = ()
         return cls(bare, tuple(surface.look for surface in meshes.surfaces), camera, limit)
 
-    def spheres(self, rows: FaceRows) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def spheres(self, rows: FaceRows) -> tuple[Floats, Floats]:
         """As of `FrontierKind`."""
         return rows.center, rows.reach
 
-    def optical(self, rows: FaceRows) -> NDArray[np.float64]:
+    def optical(self, rows: FaceRows) -> Floats:
         """As of `FrontierKind`: what is kept is one face, however large."""
         extent = self.camera.extent_around(rows.center)
         return np.where(self._wide(rows), np.minimum(rows.optical, extent**2), rows.optical)
@@ -86,11 +86,11 @@ class Faces(FrontierKind):
         """As of `FrontierKind`."""
         return rows.take(np.lexsort([rows.face, *rows.center.T]))
 
-    def _wide(self, rows: FaceRows) -> NDArray[np.bool_]:
+    def _wide(self, rows: FaceRows) -> Mask:
         width = self.meshes.width[rows.face] * self.meshes.mean_scale[rows.instance]
         return width >= self.limit * self.camera.extent_around(rows.center)
 
-    def draw(self, canvas: Canvas, slab: Waiting, side: NDArray[np.float64], shown: list[Shown]) -> None:
+    def draw(self, canvas: Canvas, slab: Waiting, side: Floats, shown: list[Shown]) -> None:
         """As of `FrontierKind`."""
         rows = slab.parts
         kept = _stays(rows, side) | self._wide(rows)
@@ -101,16 +101,14 @@ class Faces(FrontierKind):
         for whose, facets in self._facets(rows.take(rest), side[rest]):
             canvas.add_facets(whose, facets)
 
-    def unseen(
-        self, rows: FaceRows, side: NDArray[np.float64], _kept: NDArray[np.float64], shown: list[Shown]
-    ) -> Iterator[tuple[Whose, Facets]]:
+    def unseen(self, rows: FaceRows, side: Floats, _kept: Floats, shown: list[Shown]) -> Iterator[tuple[Whose, Facets]]:
         """As of `FrontierKind`; large faces stay."""
         large = _stays(rows, side)
         shown.append(("face", rows.take(np.flatnonzero(large))))
         rest = np.flatnonzero(~large)
         yield from self._facets(rows.take(rest), side[rest])
 
-    def _facets(self, rows: FaceRows, side: NDArray[np.float64]) -> Iterator[tuple[Whose, Facets]]:
+    def _facets(self, rows: FaceRows, side: Floats) -> Iterator[tuple[Whose, Facets]]:
         looks = np.array(self.looks)[self.meshes.surface[rows.instance]]
         polygons = rows.whole(self.meshes)
         for look in np.unique(looks).tolist():
@@ -119,7 +117,7 @@ class Faces(FrontierKind):
                 some = own[run]
                 yield (None, look), chosen_facets(polygons.take(some), rows.optical[some], side[some])
 
-    def triangles(self, rows: FaceRows, least: float = 0.0) -> NDArray[np.float64]:
+    def triangles(self, rows: FaceRows, least: float = 0.0) -> Floats:
         """Corners (t, 3, 3) of the triangles of opaque faces that are so many pixels wide at least, meters."""
         meshes = self.meshes
         wide = 2.0 * rows.reach >= least * self.camera.extent_around(rows.center)
@@ -128,12 +126,12 @@ class Faces(FrontierKind):
         return meshes.corners(meshes.face_triangle[some.face][owner] + index, some.instance[owner])
 
 
-def _stays(rows: FaceRows, side: NDArray[np.float64]) -> NDArray[np.bool_]:
+def _stays(rows: FaceRows, side: Floats) -> Mask:
     """Faces (n,) that are no smaller than facets of sides (n,), or as long and without area."""
     return (rows.optical >= side**2) | ((rows.optical <= 0.0) & (2.0 * rows.reach >= side))
 
 
-def chosen_facets(polygons: Polygons, optical: NDArray[np.float64], side: NDArray[np.float64]) -> Facets:
+def chosen_facets(polygons: Polygons, optical: Floats, side: Floats) -> Facets:
     """Facets of polygons (n,) that stand for an area ``optical`` (n,) in m², with sides (n,) in meters.
 
     Their number is random; its expectation is the area over that of a facet.
@@ -166,7 +164,7 @@ def chosen_facets(polygons: Polygons, optical: NDArray[np.float64], side: NDArra
     return Facets(center, np.cross(along, normal), along, side[thing], *material)
 
 
-def _keys(polygons: Polygons, owner: NDArray[np.int64]) -> NDArray[np.uint64]:
+def _keys(polygons: Polygons, owner: Integers) -> NDArray[np.uint64]:
     """Keys (m,) of triangles of polygons by their instance and, for fragments, by their corners."""
     key = key_of_seed(polygons.instance)
     cut = np.flatnonzero(polygons.part >= 0)

@@ -11,8 +11,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..arrays import Floats
 from ..camera.camera import Camera
 from ..compiled.flora import Flora
 from ..growth.foliage import envelope_reach
@@ -45,7 +45,7 @@ class LeafDetail:
         slope = 0.0 if camera.kind == "ORTHO" else camera.pixel_size
         return Pixels(lambda points, reach: coarser * self._extent(points, reach), coarser * slope)
 
-    def lengths(self, whole: WholeBranches) -> NDArray[np.float64]:
+    def lengths(self, whole: WholeBranches) -> Floats:
         """Lengths (n,) of the leaves of branches in tolerances, where they come nearest.
 
         0 where the models of the species are certainly fine enough.
@@ -70,18 +70,18 @@ class LeafDetail:
         out[near] = size[near] / np.maximum(nearest, extent / NEARER) / self.tolerance
         return out
 
-    def _errors(self) -> NDArray[np.float64]:
+    def _errors(self) -> Floats:
         """Largest error (species,) of a species' models."""
         forms = ([f for kind in range(len(LEAF_KINDS)) for f in own[kind]] for own in self.flora.forms)
         return np.array([max((coarse_error(f) for f in own), default=0.0) for own in forms])
 
-    def _extent(self, points: NDArray[np.float64], reach: NDArray[np.float64] | float) -> NDArray[np.float64]:
+    def _extent(self, points: Floats, reach: Floats | float) -> Floats:
         """Meters (n,) that a pixel spans at what reaches so far around points (n, 3), in view or not."""
         moments = self.camera, *self.camera.shutter
         away = np.min([moment.distance_to_view(points) for moment in moments], axis=0) - reach
         return np.maximum(self.camera.extent_around(points), self.beside * np.maximum(away, 0.0))
 
-    def _nearest(self, extent: NDArray[np.float64], away: NDArray[np.float64]) -> NDArray[np.float64]:
+    def _nearest(self, extent: Floats, away: Floats) -> Floats:
         """Meters (n,) that a pixel spans at things up to a distance (n,) nearer than where it spans ``extent`` (n,)."""
         if self.camera.kind == "ORTHO":
             return extent

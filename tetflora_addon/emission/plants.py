@@ -16,9 +16,8 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ..arrays import Arrays, chunks
+from ..arrays import Arrays, Floats, Mask, chunks
 from ..buffers import BLOCK_POLYGONS, MeshBuffers
 from ..camera.camera import Camera
 from ..compiled.flora import Flora
@@ -65,31 +64,31 @@ class Transition:
         """How finely near leaves are drawn."""
         return LeafDetail(self.flora, self.camera, self.tolerance, BESIDE)
 
-    def of_branches(self, branches: Branches) -> NDArray[np.float64]:
+    def of_branches(self, branches: Branches) -> Floats:
         """Real fraction (n,) of the leaves of sub-plants: a smooth step in the logarithm of their width."""
         return self._fraction(branches, np.where(self.flora.leaf_count > 0, self.flora.leaf_width, 0.0), self.limit)
 
-    def of_own_leaves(self, branches: Branches) -> NDArray[np.float64]:
+    def of_own_leaves(self, branches: Branches) -> Floats:
         """Real fraction (n,) of the leaves that branches themselves bear."""
         return self._fraction(branches, self._own_width, self.limit)
 
-    def of_kites(self, branches: Branches) -> Iterator[NDArray[np.float64]]:
+    def of_kites(self, branches: Branches) -> Iterator[Floats]:
         """Fractions (n,) of the real leaves of branches themselves that are single kites, and those or one a plane."""
         for widths in np.moveaxis(self.kite_widths, -1, 0):
             yield 1.0 - self._fraction(branches, self._own_width * KITES / widths, KITES)
 
     @cached_property
-    def kite_widths(self) -> NDArray[np.float64]:
+    def kite_widths(self) -> Floats:
         """Widths in pixels (r, 2) up to which the leaves of rows are kites, and have one for each plane."""
         limits = [[kite_widths(kinds) for kinds in one] for one in self.flora.forms]
         return np.array(limits)[self.flora.rows["species"], self.flora.rows["leaf_kind"]]
 
     @property
-    def _own_width(self) -> NDArray[np.float64]:
+    def _own_width(self) -> Floats:
         """Width (r,) of the leaves that branches of rows bear, meters."""
         return self.flora.rows["leaf_size"][:, 0] * self.flora.leaf.width
 
-    def _fraction(self, branches: Branches, widths: NDArray[np.float64], limit: float) -> NDArray[np.float64]:
+    def _fraction(self, branches: Branches, widths: Floats, limit: float) -> Floats:
         width = widths[branches.row] * branches.scale
         return explicit_fraction(width / np.maximum(self.camera.extent_around(branches.position), 1e-300), limit)
 
@@ -115,8 +114,8 @@ class Block:
 
 
 def inside_explicit(
-    shared: SharedParts, result: Refinement, opening: Callable[[Arrays, NDArray[np.float64]], NDArray[np.bool_]]
-) -> Iterator[tuple[Arrays, NDArray[np.float64]]]:
+    shared: SharedParts, result: Refinement, opening: Callable[[Arrays, Floats], Mask]
+) -> Iterator[tuple[Arrays, Floats]]:
     """All parts of one kind, some at a time, and the fraction (n,) of each that lies in explicit tetrahedra.
 
     Those of which something does are opened where ``opening`` wants it of parts and these fractions.

@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import chunks, spread
+from ..arrays import Floats, Integers, Integers32, chunks, spread
 from ..buffers import BLOCK_POLYGONS, MeshBuffers
 from ..refinement.decisions import Decision
 from ..refinement.loop import Refinement
@@ -134,7 +134,7 @@ def polygon_buffers(polygons: Polygons) -> MeshBuffers:
     )
 
 
-def _face_corners(whole: Polygons) -> tuple[NDArray[np.int64], NDArray[np.int32], NDArray[np.int64]]:
+def _face_corners(whole: Polygons) -> tuple[Integers, Integers32, Integers]:
     """Corners (c,) of faces, the instance (c,) of each, and how many (f,) each face has."""
     meshes = whole.meshes
     size = meshes.face_size[whole.face]
@@ -144,7 +144,7 @@ def _face_corners(whole: Polygons) -> tuple[NDArray[np.int64], NDArray[np.int32]
     return meshes.face_start[whole.face][owner] + index, whole.instance[owner], size
 
 
-def _edges(corner_verts: NDArray, offsets: NDArray, vertices: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+def _edges(corner_verts: NDArray, offsets: NDArray, vertices: int) -> tuple[Integers, Integers]:
     """Edges (e, 2) of faces, each once, and that from each corner (c,) to the next."""
     following = np.arange(len(corner_verts)) + 1
     following[offsets[1:] - 1] = offsets[:-1]
@@ -154,9 +154,7 @@ def _edges(corner_verts: NDArray, offsets: NDArray, vertices: int) -> tuple[NDAr
     return np.stack(np.divmod(edges, max(vertices, 1)), axis=1), number.reshape(-1)
 
 
-def _at_corners(
-    values: NDArray, corner: NDArray[np.integer], triangle: NDArray[np.integer], weights: NDArray[np.float64]
-) -> NDArray[np.float64]:
+def _at_corners(values: NDArray, corner: Integers, triangle: Integers, weights: Floats) -> Floats:
     """Values at corners of whole faces, then at those of fragments (n, 3, 3) of triangles (n, 3)."""
     between = (weights @ values[triangle].astype(np.float64)).reshape(-1, values.shape[1])
     return np.concatenate([values[corner].astype(np.float64), between])

@@ -13,7 +13,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import in_axes
+from ..arrays import Floats, Integers, in_axes
 from ..refinement.lights import Light, frame_toward
 
 #: Cells of the grid across the light along each side, and layers along it, at most.
@@ -53,11 +53,11 @@ class Shade:
         table = table.reshape(self._size) * (0.5 / step**2)
         self._table = (np.cumsum(table[:, :, ::-1], axis=2)[:, :, ::-1] - 0.5 * table).ravel()
 
-    def _index(self, places: NDArray[np.float64]) -> NDArray[np.int64]:
+    def _index(self, places: Floats) -> Integers:
         at = np.clip(np.floor((places - self._low) / self._step), 0, self._size - 1).astype(np.int64)
         return (at[:, 0] * self._size[1] + at[:, 1]) * self._size[2] + at[:, 2]
 
-    def depth(self, points: NDArray[np.float64], nearer: NDArray[np.float64] | float = 0.0) -> NDArray[np.float64]:
+    def depth(self, points: Floats, nearer: Floats | float = 0.0) -> Floats:
         """Optical depth (n,) of all that is between the light and points (n, 3), moved so many meters toward it."""
         if self._table is None:
             return np.zeros(len(points))

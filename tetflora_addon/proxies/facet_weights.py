@@ -32,7 +32,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import GOLDEN_TURN, Floats, Integers, Mask, Table, spiral, spread
+from ..arrays import GOLDEN_TURN, Floats, Floats32, Integers, Mask, Table, spiral, spread
 from ..compiled.clumping import fingerprint
 from ..compiled.flora import Flora, compile_species
 from ..compiled.rays import PlantElements, basis, elements_of
@@ -208,7 +208,7 @@ def digest(flora: Flora, number: int) -> str:
 
 
 @cache
-def shipped() -> dict[str, NDArray[np.float32]]:
+def shipped() -> dict[str, Floats32]:
     """Weights (2, r, k) of the shipped species and their variants by `digest`."""
     try:
         table = json.loads(TABLE.read_text(encoding="utf-8"))

@@ -19,7 +19,7 @@ from itertools import permutations
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from ..arrays import Floats, Integers
 from .geometry import plane_through, quality, signed_volume
@@ -247,7 +247,7 @@ def _center(piece: _Piece) -> Floats:
 SMALLEST = 1.0
 
 
-def world_cubes(bounds: ArrayLike) -> tuple[float, NDArray[np.int64], NDArray[np.int64]]:
+def world_cubes(bounds: ArrayLike) -> tuple[float, Integers, Integers]:
     """Cubes around a scene, at most two along each axis.
 
     Parameters

@@ -19,7 +19,7 @@ import gpu
 import numpy as np
 from numpy.typing import NDArray
 
-from ...arrays import Floats, Floats32
+from ...arrays import Floats, Floats32, Integers
 from ...camera.camera import Camera
 from ...preview.levels import FORMS, THICK, Level, Levels, as_shown, colors_of, drawable, project
 from ...preview.light_plants import CrownPoints, Shapes, nearest
@@ -55,7 +55,7 @@ def batch(kind: str, positions: NDArray, colors: NDArray, indices: NDArray) -> g
     return gpu.types.GPUBatch(type=kind, buf=corners, elem=elements)
 
 
-def chosen_by_worth(level: Level, forms: set[str], most: int) -> NDArray[np.intp]:
+def chosen_by_worth(level: Level, forms: set[str], most: int) -> Integers:
     """Places (k,) in a level of tetrahedra of some forms, at most so many, those that change most pixels first."""
     wanted = np.flatnonzero(np.isin(level.decision, [Decision[name] for name in forms]))
     if len(wanted) <= most:
