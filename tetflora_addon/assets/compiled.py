@@ -11,10 +11,9 @@ more). Parallel rays are cast through the triangles of some clusters of each dep
 transparent, and through facets at their samples, as many as there may be.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Generator, Iterator
 from dataclasses import dataclass, replace
+from typing import Self
 
 import numpy as np
 
@@ -81,7 +80,7 @@ class _View:
     step: float
 
     @classmethod
-    def of(cls, clusters: Clusters, cluster: int, direction: Floats) -> _View:
+    def of(cls, clusters: Clusters, cluster: int, direction: Floats) -> Self:
         u, v = basis(direction / np.linalg.norm(direction))
         bound = np.stack([clusters.low[cluster], clusters.high[cluster]])
         box = np.stack(np.meshgrid(*bound.T, indexing="ij"), -1).reshape(-1, 3)

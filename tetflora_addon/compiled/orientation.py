@@ -10,10 +10,9 @@ fitted for skies all around the branch, but half of them are where an upright pl
 cannot follow is missed where no branch stands.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Self
 
 import numpy as np
 
@@ -203,13 +202,13 @@ class _Sums:
     weight: Floats
 
     @classmethod
-    def of(cls, n: int, owner: Integers, moment: Floats, weight: Floats) -> _Sums:
+    def of(cls, n: int, owner: Integers, moment: Floats, weight: Floats) -> Self:
         """Sums over things (m,) on branches (m,) of n, with moments (m, 3, 3)."""
         values = (moment * weight[:, None, None]).reshape(-1, 9).T
         sums = np.stack([np.bincount(owner, one, n) for one in values], axis=1)
         return cls(sums.reshape(n, 3, 3), np.bincount(owner, weight, n))
 
-    def mixed(self, other: _Sums, fraction: float) -> _Sums:
+    def mixed(self, other: Self, fraction: float) -> Self:
         """Both together; this one has a known fraction of all."""
         if other.weight.sum() <= 0:
             return self

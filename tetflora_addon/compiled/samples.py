@@ -10,10 +10,9 @@ Kahn and Harris, "Estimation of particle transmission by random sampling", 1951)
 Those of trunks know which limbs they are on, so that they can be moved as the crown shape of a plant moves its limbs.
 """
 
-from __future__ import annotations
-
 from collections.abc import Container, Sequence
 from dataclasses import dataclass, replace
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -57,8 +56,8 @@ class Points:
     outward: Floats32  # (k,): place between the inside and the outside of the crown
     light: Floats32  # (k,): how far a leaf turns to the sky
     young: Floats32  # (k,): how young it is, see `growth.foliage.youth`
-    limbs: Limbs  # of k
-    shares: Shares  # of r
+    limbs: "Limbs"  # of k
+    shares: "Shares"  # of r
 
     def runs(self, subplants: Branches) -> tuple[Integers, Integers]:
         """First sample and number of samples (n,), (n,) that stand for sub-plants as they are turned to the sky."""
@@ -138,10 +137,10 @@ class _Points(Arrays):
     light: Floats
     young: Floats
     area: Floats
-    limbs: Limbs | None = None
+    limbs: "Limbs | None" = None
 
     @classmethod
-    def on(cls, rows: Table, one: _Arrived, branch: Integers, position: NDArray, *rest: NDArray) -> _Points:
+    def on(cls, rows: Table, one: "_Arrived", branch: Integers, position: NDArray, *rest: NDArray) -> Self:
         """Points on branches, given by number."""
         row = one.branches.row[branch]
         short = rows["order"][row[:1]] == SPUR_ORDER
@@ -371,7 +370,7 @@ class Shares:
     follows: Floats  # (r,): mean over those on limbs
 
     @classmethod
-    def of(cls, limbs: Limbs, row: Integers, rows: int) -> Shares:
+    def of(cls, limbs: Limbs, row: Integers, rows: int) -> Self:
         """Of samples (k,) of rows (k,), of which there are so many."""
         on = limbs.kind >= LIMB
         kinds = np.bincount(row.astype(np.int64) * 4 + limbs.kind, minlength=4 * rows).reshape(rows, 4)

@@ -7,8 +7,6 @@ as fast as through ten. Where all assets fit into memory, plain instances are th
 every triangle of every instance. ``python -m benchmarks assets`` measures both.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -8,11 +8,10 @@ nothing more, and keeps all that the artist has made. What is drawn as it is cov
 these are more than a few pixels, or else by facets, as many as are needed for that.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -65,7 +64,7 @@ class AssetPlan:
     kites: AssetParts = field(default_factory=AssetParts.empty)
 
     @classmethod
-    def of(cls, placed: PlacedAssets, originals: OriginalPolicy, shown: list[Shown]) -> AssetPlan:
+    def of(cls, placed: PlacedAssets, originals: OriginalPolicy, shown: list[Shown]) -> Self:
         """What a drawing has shown."""
         every = {
             label: AssetParts.concatenate([AssetParts.empty(), *(rows for what, rows in shown if what == label)])
@@ -84,7 +83,7 @@ class ClusterRows(AssetParts):
     shown: Mask = column(dtype=bool)  # (n,): drawn as they are: only what they cover is to be found
 
     @classmethod
-    def of(cls, parts: AssetParts, shown: Mask) -> ClusterRows:
+    def of(cls, parts: AssetParts, shown: Mask) -> Self:
         """Parts (n,), of which some are shown already."""
         return cls(*vars(parts).values(), shown)
 

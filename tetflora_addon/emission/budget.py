@@ -7,8 +7,6 @@ full. Where facets are larger, there are fewer, as their area is. Where there ar
 to be. Shells have one size; there, real leaves go to the tetrahedra that gain most by them for each polygon.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 
 import numpy as np

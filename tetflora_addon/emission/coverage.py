@@ -9,8 +9,6 @@ their bounds against the farthest depth in the rectangle of pixels that they tou
 all of that is full before it begins.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from itertools import pairwise
 

@@ -8,8 +8,6 @@ primitive by primitive. What nobody sees only casts shadows and sends light back
 of which lies behind full pixels as a whole.
 """
 
-from __future__ import annotations
-
 import itertools
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace

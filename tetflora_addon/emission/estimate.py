@@ -12,8 +12,6 @@ Seconds are fitted to the cases of ``python -m benchmarks forest``, at 1920 × 1
 changes, and those of what is expanded to plants of three species. Other machines differ by their speed.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 
 import numpy as np

@@ -6,8 +6,6 @@ A spruce three meters away has a hundred times as many polygons as the same one 
 polygons on them, so the nearest plants are grown to their twigs to ask each branch how fine it will be.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import numpy as np

@@ -10,11 +10,10 @@ only on its own number: they stay when others come into view or are kept. Chance
 of a mesh, which keeps its area with little noise.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from copy import copy
 from dataclasses import dataclass
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -46,7 +45,7 @@ class FaceRows(Arrays):
     optical: Floats  # (n,): area that each blocks, m²
 
     @classmethod
-    def of(cls, whole: Polygons) -> FaceRows:
+    def of(cls, whole: Polygons) -> Self:
         """Whole faces (n,)."""
         return cls(whole.face, whole.instance, whole.center, whole.reach, polygon_totals(whole).optical_area)
 
@@ -67,7 +66,7 @@ class Faces(FrontierKind):
     stays = True
 
     @classmethod
-    def of(cls, meshes: Meshes, camera: Camera, limit: float) -> Faces:
+    def of(cls, meshes: Meshes, camera: Camera, limit: float) -> Self:
         """All faces of meshes."""
         bare = copy(meshes)
         bare.surfaces = ()

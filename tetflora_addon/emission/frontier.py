@@ -9,11 +9,9 @@ the next ones follow. Each part is opened once, and everything that is made foll
 what to open before anything is drawn (`refinement`); what is hidden is decided here.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import Protocol
+from typing import Protocol, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -75,7 +73,7 @@ class FrontierKind:
     larger = 1.0  # sides of its facets over those of plants
     stays = False  # whether parts that nobody sees may stay as they are: then none of them can stand for others
 
-    def coarser(self, _times: float) -> FrontierKind:
+    def coarser(self, _times: float) -> Self:
         """The same, of which what is drawn as itself is so many times as large before it is."""
         return self
 

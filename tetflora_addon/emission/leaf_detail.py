@@ -6,8 +6,6 @@ The coarsest level whose margin is within a tolerance of the leaf's own is enoug
 branch are in the image where it comes nearest: nothing depends on the order of branches or on earlier images.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

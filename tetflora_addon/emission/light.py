@@ -6,10 +6,9 @@ All surfaces that will be drawn are collected first, as sheets (`SheetList`). `b
 light, which is the paper's shadow pass, and `BakedLight` gives the light of facets, spheres, shells and faces.
 """
 
-from __future__ import annotations
-
 from collections.abc import Generator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -112,7 +111,7 @@ class Sources:
     occluders: Floats  # (t, 3, 3): triangles of ground and buildings, meters
     ground: Floats  # (3,): their mean color, linear
 
-    def counted_from(self, origin: Floats) -> Sources:
+    def counted_from(self, origin: Floats) -> Self:
         """The same in coordinates that begin at a place (3,) of the present ones."""
         lights = tuple(light.counted_from(origin) for light in self.lights)
         return replace(self, lights=lights, occluders=self.occluders - origin)

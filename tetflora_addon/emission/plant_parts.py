@@ -6,10 +6,9 @@ A leaf is drawn as itself where a facet would be about as large (`plants.Transit
 tubes while they are macroscopic, and else one thin triangle each, with the direction and the area of the branch.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, fields, replace
+from typing import Self
 
 import numpy as np
 
@@ -62,7 +61,7 @@ class PlantRows(PlantParts):
     beside: Floats  # (n,): how far they reach from it, meters
 
     @classmethod
-    def of(cls, flora: Flora, parts: PlantParts, lines: Axes | None = None) -> PlantRows:
+    def of(cls, flora: Flora, parts: PlantParts, lines: Axes | None = None) -> Self:
         """Parts (n,), of which the axes are known where they are branches alone that were opened just now.
 
         Sub-plants reach as far as samples of their leaves and wood.
@@ -92,7 +91,7 @@ class GrownPlants(FrontierKind):
     weights: FacetWeights
     lights: Sequence[Light]
 
-    def coarser(self, times: float) -> GrownPlants:
+    def coarser(self, times: float) -> Self:
         """As of `FrontierKind`."""
         limit, tolerance = times * self.transition.limit, times**2 * self.transition.tolerance
         return replace(self, transition=replace(self.transition, limit=limit, tolerance=tolerance))

@@ -9,8 +9,6 @@ Real leaves are single kites first, those with many planes a kite for each then,
 of width on, one after another; where these can be told from what they stand for, finer ones, see `leaf_detail`.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property

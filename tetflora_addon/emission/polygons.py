@@ -5,8 +5,6 @@
 A face whose fragments are all kept comes out as the face that it was.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 

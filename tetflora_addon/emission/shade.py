@@ -6,8 +6,6 @@ Optical depths add up along the light as they do along a view (paper, section 6.
 layer by layer, and their cumulative sum.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Shells: proxies as closed tetrahedra with the attributes that a shader needs to show the cloud inside (paper, 7)."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -7,8 +7,6 @@ for "nothing known", scale and offset are GDAL's. Compressions are those of TIFF
 Zstandard). Blender's own reader makes flat ground or noise of what it cannot decode; here damage is an error.
 """
 
-from __future__ import annotations
-
 import lzma
 import math
 import re
@@ -94,7 +92,7 @@ def place_of_image(path: Path) -> Raster:
     return Raster(np.zeros((1, 1), np.float32), *place, system)
 
 
-def _place(path: Path, tags: _Tags | None = None) -> tuple[list[Floats], System]:
+def _place(path: Path, tags: "_Tags | None" = None) -> tuple[list[Floats], System]:
     """Middle of the first pixel, steps along and down, and the system, by tags or else by files beside the image."""
     place, system = (tags.place(), tags.system()) if tags is not None else (None, System())
     return world_file(path) if place is None else place, system_beside(path) if system == System() else system

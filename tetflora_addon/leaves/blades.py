@@ -5,8 +5,6 @@
 Compound leaves: leaflets in pairs along a rachis, as of ash and fern, or around a point, as petals.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from functools import lru_cache
 

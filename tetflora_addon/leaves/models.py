@@ -10,8 +10,6 @@ its area. What is open, such as stalks, stays as it is. Up close spines grow fro
 closed parts.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any

@@ -5,8 +5,6 @@
 Sizes, numbers and the order in which facets come and go are those of plants (`facet_sizes`, `microsurfaces`).
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

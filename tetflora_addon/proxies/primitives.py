@@ -9,8 +9,6 @@ faces the eye; a sphere covers the same from everywhere. A sphere can therefore 
 camera, but not for all lights as well.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import TypeVar

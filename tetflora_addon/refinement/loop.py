@@ -9,8 +9,6 @@ The root of the tree holds all that there is. One plant 1,000 km away takes twen
 anything of the size of the others, and with that what the settings allow. Outliers are left out, and named.
 """
 
-from __future__ import annotations
-
 from collections.abc import Generator, Sequence
 from dataclasses import dataclass, field, replace
 

@@ -12,10 +12,9 @@ How plants come: planted, or from seeds of the plants around and of the woods ou
 Plants, alive and dead, are structures of arrays; records are what a simulation says of them at several years.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from enum import IntEnum
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -58,7 +57,7 @@ class Records(Arrays):
         """Which lie (n,)."""
         return (self.lean * self.lean).sum(axis=1) >= (LYING * 0.999) ** 2
 
-    def at(self, year: float) -> Records:
+    def at(self, year: float) -> Self:
         """Plants that are there in a year, one row each: linear between two records.
 
         Before the first and after the last record of a plant it is not there.

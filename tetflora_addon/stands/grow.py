@@ -6,8 +6,6 @@ All random numbers are hashes of the seed, the plant and the year, and sums are 
 whatever the number of threads.
 """
 
-from __future__ import annotations
-
 from collections.abc import Generator, Sequence
 from dataclasses import dataclass, replace
 
@@ -85,7 +83,7 @@ def grow(
     return stand.finished()
 
 
-def begun(site: StandSite, species: Sequence[StandSpecies], settings: StandSettings) -> GrowingStand:
+def begun(site: StandSite, species: Sequence[StandSpecies], settings: StandSettings) -> "GrowingStand":
     """A stand at its beginning, which whoever has it steps from year to year; see `grow`."""
     _check(settings)
     return GrowingStand(site, StandTraits(species), settings)

@@ -12,8 +12,6 @@ tetrahedra around its diagonal. Bisection of their longest edges makes tetrahedr
 Computing 16, 1995). Coordinates are sums of powers of two, so a place has the same tetrahedron from any camera.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from itertools import permutations
 from typing import Protocol
@@ -49,15 +47,15 @@ class _Cut:
     """A convex piece cut in two by the plane through three points, which has ``negative`` on side 0."""
 
     through: Floats
-    negative: _Piece
-    positive: _Piece
+    negative: "_Piece"
+    positive: "_Piece"
 
 
 @dataclass(frozen=True)
 class _View:
     """A piece that is what the camera sees."""
 
-    piece: _Piece
+    piece: "_Piece"
 
 
 #: A tetrahedron (4, 3), or a piece that is cut further.

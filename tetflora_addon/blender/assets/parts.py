@@ -7,8 +7,6 @@ collections, nodes and particles is followed down to meshes. Its digest, of mesh
 what it shows has changed since it was compiled.
 """
 
-from __future__ import annotations
-
 import hashlib
 from collections.abc import Generator, Iterator
 from contextlib import contextmanager
@@ -70,7 +68,7 @@ def attributes_of(material: bpy.types.Material | None) -> Iterator[str]:
                 waiting.append(node.node_tree)
 
 
-def _add_tree(content: hashlib._Hash, tree: bpy.types.NodeTree) -> None:
+def _add_tree(content: "hashlib._Hash", tree: bpy.types.NodeTree) -> None:
     nodes = {node.as_pointer(): i for i, node in enumerate(tree.nodes)}
     for node in tree.nodes:
         if node.type in {'FRAME', 'REROUTE'}:
@@ -100,7 +98,7 @@ def _settings(node: bpy.types.Node) -> list[str]:
 _known: dict[str, list[str]] = {}
 
 
-def _add(content: hashlib._Hash, name: str, value: Any) -> None:
+def _add(content: "hashlib._Hash", name: str, value: Any) -> None:
     if isinstance(value, bpy.types.Image):
         value = image_digest(value)
     elif isinstance(value, bpy.types.NodeTree):
@@ -359,7 +357,7 @@ def digest_of_parts(parts: list[AssetPart], depsgraph: bpy.types.Depsgraph) -> s
     return content.hexdigest()
 
 
-def _add_mesh(content: hashlib._Hash, mesh: bpy.types.Mesh, slots: Slots) -> None:
+def _add_mesh(content: "hashlib._Hash", mesh: bpy.types.Mesh, slots: Slots) -> None:
     for material in slots:
         content.update(material_digest(material).encode())
     content.update(f"{len(mesh.vertices)} {len(mesh.polygons)} {len(mesh.loops)}".encode())
