@@ -5,6 +5,7 @@
 import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
+from functools import partial
 
 import numpy as np
 
@@ -157,18 +158,6 @@ class AsSpheres:
         return spheres_of(facets, None, self.disc, self.camera.distance_to_view(facets.center) > 0.0)
 
 
-def _triangles_everywhere(_camera: Camera, _disc: float) -> FacetConverter:
-    return as_triangles
-
-
-def _spheres_everywhere(camera: Camera, disc: float) -> FacetConverter:
-    return AsSpheres(camera, disc, seen_too=True)
-
-
-def _spheres_where_hidden(camera: Camera, disc: float) -> FacetConverter:
-    return AsSpheres(camera, disc, seen_too=False)
-
-
 def facet_blocks(refined: EmissionInput) -> Iterator[Buffers]:
     """Facets as the form of the drawing has made them: triangles, spheres, or triangles where they are seen."""
     for parts in refined.facet_parts():
@@ -212,10 +201,10 @@ def _baked_spheres(refined: EmissionInput, light: BakedLight, first_sheet: int) 
         yield replace(made, attributes={**made.attributes, **baked}, species=parts.species, look=parts.look)
 
 
-MICROSURFACES = ProxyEmitter(facet_blocks, _triangles_everywhere, _baked_facets)
-MICROSPHERES = ProxyEmitter(facet_blocks, _spheres_everywhere, _baked_spheres)
+MICROSURFACES = ProxyEmitter(facet_blocks, lambda _camera, _disc: as_triangles, _baked_facets)
+MICROSPHERES = ProxyEmitter(facet_blocks, partial(AsSpheres, seen_too=True), _baked_spheres)
 #: Facets where they are seen, spheres elsewhere. Where light is baked, all are facets.
-AUTOMATIC = ProxyEmitter(facet_blocks, _spheres_where_hidden, _baked_facets)
+AUTOMATIC = ProxyEmitter(facet_blocks, partial(AsSpheres, seen_too=False), _baked_facets)
 #: Shells fill their tetrahedra evenly, so that hidden ones are divided as well; those that are seen further, because
 #: their shape shows.
 SHELLS = ProxyEmitter(shell_blocks, None, shell_blocks, faces=4.0, hidden_block=16.0, proxy_block=4.0)

@@ -162,10 +162,8 @@ class GrownPlants(FrontierKind):
     def _draw_subplants(self, canvas: Canvas, branches: Branches, side: Floats) -> None:
         if not len(branches):
             return
-        leaf, species = (
-            np.maximum(side, np.sqrt(self.flora.one_leaf_area(branches))),
-            self.flora.species_of(branches.row),
-        )
+        leaf = np.maximum(side, np.sqrt(self.flora.one_leaf_area(branches)))
+        species = self.flora.species_of(branches.row)
         for s in np.flatnonzero(np.bincount(species)).tolist():
             some = np.flatnonzero(species == s)
             own = branches.take(some)

@@ -491,7 +491,10 @@ def drawn_branches(skeleton: Skeleton) -> DrawnBranches:
     at = np.where(grown_on >= 0, np.minimum(place[before[heads]] / np.maximum(length[grown_on], 1e-300), 1.0), 0.0)
     level = generation[heads]
     order = np.minimum(level, MAX_ORDERS - 1).astype(np.int32)
-    outward = _outward(level, grown_on, at)
+    # See `DrawnBranches`, from the number of forks (b,) below each branch.
+    outward = np.where(level == 2, at, 0.0)
+    for g in range(3, int(level.max(initial=0)) + 1):
+        outward[level == g] = outward[grown_on[level == g]]
     return DrawnBranches(first, knots, along, order, grown_on.astype(np.int32), at, length, outward)
 
 
@@ -540,11 +543,3 @@ def _arc(knots: Floats, first: Integers) -> Floats:
     step[first[:-1]] = 0.0
     total = np.cumsum(step)
     return total - np.repeat(total[first[:-1]], np.diff(first))
-
-
-def _outward(level: Integers, parent: Integers, at: Floats) -> Floats:
-    """See `DrawnBranches`, from the number of forks (b,) below each branch."""
-    outward = np.where(level == 2, at, 0.0)
-    for g in range(3, int(level.max(initial=0)) + 1):
-        outward[level == g] = outward[parent[level == g]]
-    return outward

@@ -294,7 +294,16 @@ def add_stand_in(
         for switch in _TURNED_OFF:
             if getattr(made.tetflora, switch, False):
                 setattr(made.tetflora, switch, False)
-        _drop_instances(made)
+        made.instance_type = 'NONE'
+        for modifier in list(made.modifiers):
+            if modifier.type == 'PARTICLE_SYSTEM' and modifier.particle_system.settings.render_type in _INSTANCED:
+                made.modifiers.remove(modifier)
+        nodes = [n for n, modifier in enumerate(made.modifiers) if modifier.type == 'NODES']
+        if nodes:
+            modifier = made.modifiers.new("Without Instances", 'NODES')
+            modifier.node_group = _bare_group()
+            # Not at the end: adaptive subdivision has to be the last one.
+            made.modifiers.move(len(made.modifiers) - 1, nodes[-1] + 1)
     look_like(made, original, results.owners.get(original))
     return results.add_object(name, made, STAND_IN, placed=True)
 
@@ -334,19 +343,6 @@ def _is_simulated(original: bpy.types.Object) -> bool:
                 groups.add(inner)
                 waiting.append(inner)
     return any(modifier.type in _SIMULATED for modifier in original.modifiers)
-
-
-def _drop_instances(made: bpy.types.Object) -> None:
-    made.instance_type = 'NONE'
-    for modifier in list(made.modifiers):
-        if modifier.type == 'PARTICLE_SYSTEM' and modifier.particle_system.settings.render_type in _INSTANCED:
-            made.modifiers.remove(modifier)
-    nodes = [n for n, modifier in enumerate(made.modifiers) if modifier.type == 'NODES']
-    if nodes:
-        modifier = made.modifiers.new("Without Instances", 'NODES')
-        modifier.node_group = _bare_group()
-        # Not at the end: adaptive subdivision has to be the last one.
-        made.modifiers.move(len(made.modifiers) - 1, nodes[-1] + 1)
 
 
 def _bare_group() -> bpy.types.NodeTree:

@@ -156,20 +156,6 @@ def _crown_shader() -> gpu.types.GPUShader:
     return gpu.shader.create_from_info(info)
 
 
-def _draw_points(made: gpu.types.GPUBatch, origin: Floats, eye: Floats, least: float) -> None:
-    region, height = bpy.context.region_data, bpy.context.region.height
-    shader = _crown_shader()
-    with gpu.matrix.push_pop():
-        gpu.matrix.translate(origin.tolist())
-        shader.uniform_float("matrix", gpu.matrix.get_projection_matrix() @ gpu.matrix.get_model_view_matrix())
-        down = abs(region.view_matrix[2][2])
-        shader.uniform_float("view", (0.5 * height * region.window_matrix[1][1], down, 0.0, 0.0))
-        shader.uniform_float("eye", (*(eye - origin).tolist(), least))
-        gpu.state.program_point_size_set(True)
-        made.draw(shader)
-        gpu.state.program_point_size_set(False)
-
-
 def pyramid(camera: Camera, far: float, color: tuple[float, float, float, float]) -> gpu.types.GPUBatch:
     """Edges of what a camera sees between its near plane and a distance; its place and directions for a panorama."""
     if camera.kind == "PANO":
@@ -236,7 +222,17 @@ def _draw_plants(preview: Preview) -> None:
     gpu.state.face_culling_set('NONE')
     if shapes.crowns is not None:
         dots = _kept(preview, "points", (preview.made,), lambda: points(preview))
-        _draw_points(dots, shapes.origin, eye, least)
+        region, height = bpy.context.region_data, bpy.context.region.height
+        shader = _crown_shader()
+        with gpu.matrix.push_pop():
+            gpu.matrix.translate(shapes.origin.tolist())
+            shader.uniform_float("matrix", gpu.matrix.get_projection_matrix() @ gpu.matrix.get_model_view_matrix())
+            down = abs(region.view_matrix[2][2])
+            shader.uniform_float("view", (0.5 * height * region.window_matrix[1][1], down, 0.0, 0.0))
+            shader.uniform_float("eye", (*(eye - shapes.origin).tolist(), least))
+            gpu.state.program_point_size_set(True)
+            dots.draw(shader)
+            gpu.state.program_point_size_set(False)
     gpu.state.depth_mask_set(False)
 
 
