@@ -191,7 +191,12 @@ class _Walk:
             for sort in (LATERAL, FORK, SPUR, DEAD):
                 child = int(rows["next"][row, sort])
                 if child >= 0 and rows["count"][row, sort, 0] > 0:
-                    arrived[child - first].append(_one_child_each(rows, one, lines, sort))
+                    # A child of one sort of each branch that has any.
+                    counts = _at_least_some(branch_counts(rows, one.branches, sort))
+                    alive = np.flatnonzero(counts)
+                    index = (evenly(one.branches.key, _CHILD + sort) * counts).astype(np.int64)[alive]
+                    children = chosen_children(rows, one.branches, lines, alive, index, counts, sort)
+                    arrived[child - first].append(_Arrived(children, (one.weight * counts)[alive], one.line[:, alive]))
             for number, child in enumerate(range(*rows["drawn_rows"][row])):
                 places = self._number(child)
                 owner = thinned(len(one.weight), places)
@@ -319,15 +324,6 @@ def _leaf_points(rows: Table, one: _Arrived, lines: Axes) -> _Points:
     light = np.broadcast_to(leaves.light, len(leaves))  # may be one number for all
     young = youth(rows, branches.row[:1], t)
     return _Points.on(rows, one, picked, leaves.position, leaves.frame, outward, light, young, area)
-
-
-def _one_child_each(rows: Table, one: _Arrived, lines: Axes, sort: int) -> _Arrived:
-    """A child of one sort of each branch that has any."""
-    counts = _at_least_some(branch_counts(rows, one.branches, sort))
-    alive = np.flatnonzero(counts)
-    index = (evenly(one.branches.key, _CHILD + sort) * counts).astype(np.int64)[alive]
-    children = chosen_children(rows, one.branches, lines, alive, index, counts, sort)
-    return _Arrived(children, (one.weight * counts)[alive], one.line[:, alive])
 
 
 def _joined(found: list[tuple[int, _Points, Integers, Integers]], rows: int) -> Points:

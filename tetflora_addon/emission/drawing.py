@@ -220,7 +220,9 @@ def _drawn_tile(
     number, columns, parts, share = item
     tile = _Tile(given, columns)
     if columns is None:
-        tile.draw_outside(parts, share)
+        # Parts out of view, a share of all of them.
+        pools = list(map(tile.frontier.pool, tile.given.kinds, parts))
+        tile._draw_outside(pools, share, _UNSEEN * share * tile.given.most)
         return tile.made(number)
     tile.draw(parts, (columns[1] - columns[0]) / tile.coverage.width, share * given.most)
     return tile.made(number)
@@ -319,11 +321,6 @@ class _Tile:
                 else:
                     del self._facets[what]
             self.number, number = self.number - gone, number - gone
-
-    def draw_outside(self, parts: Sequence[Arrays], share: float) -> None:
-        """Parts out of view, a share of all of them."""
-        pools = list(map(self.frontier.pool, self.given.kinds, parts))
-        self._draw_outside(pools, share, _UNSEEN * share * self.given.most)
 
     # -- what is seen ---------------------------------------------------------------------------------------------
 

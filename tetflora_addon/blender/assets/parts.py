@@ -17,7 +17,7 @@ from typing import Any
 import bpy
 import numpy as np
 
-from ...arrays import Floats, Integers32
+from ...arrays import Floats
 from ...assets.asset import AssetSource, AssetSurface
 from ...errors import SceneError
 from ...jobs import mapped
@@ -452,14 +452,8 @@ def _surface_steps(
         looks = reader.prepare(mesh, slots)
     yield 0.0
     found = yield from looks.steps(faces, positions, loops, corner_verts, face)
-    return AssetSurface(
-        name=part.name, positions=positions, triangles=_vertices(loops, corner_verts), face=face, **found
-    )
-
-
-def _vertices(loops: Integers32, corner_verts: Integers32) -> Integers32:
-    """Vertices of triangles from their corners, in the same array."""
+    # Vertices of triangles from their corners, in the same array.
     for start in range(0, len(loops), _TRIANGLES):
         piece = loops[start : start + _TRIANGLES]
         piece[:] = np.take(corner_verts, piece)
-    return loops
+    return AssetSurface(name=part.name, positions=positions, triangles=loops, face=face, **found)
