@@ -17,7 +17,7 @@ from ..refinement.decisions import Decision, contributions
 from ..refinement.loop import Refinement
 from ..refinement.settings import RefinementSettings
 from .drawing import HIDDEN_A_PIXEL, OUTSIDE_A_PIXEL
-from .leaf_detail import TOLERANCE
+from .plants import TOLERANCE
 
 #: Approximate bytes of a polygon in Blender (110) and in a renderer (500) together.
 BYTES_PER_POLYGON = 610

@@ -31,10 +31,10 @@ from ..refinement.loop import Refinement
 from ..refinement.shared_parts import SharePoints
 from .asset_plan import PlacedClusters
 from .coverage import Coverage
-from .faces import FaceRows, Faces
 from .frontier import DETAIL, FEW, Frontier, FrontierKind, Shown, Waiting, Whose
 from .plant_parts import GrownPlants, PlantRows
 from .plants import Block, Transition
+from .polygons import FaceRows, Faces
 from .shade import Shade
 
 #: Least width of a tile, pixels, and pixels around it that its coverage knows.

@@ -28,12 +28,10 @@ from ..proxies.primitives import (
 from ..refinement.loop import Refinement
 from .asset_plan import AssetPlan, OriginalPolicy, explicit_plan
 from .drawing import Drawing, FacetConverter, Parts, drawn_blocks
-from .faces import FaceRows
 from .frontier import Shown
-from .leaf_detail import TOLERANCE
 from .light import BakedLight, baked_attributes
-from .plants import Block, explicit_blocks
-from .polygons import PolygonBlock, kept_polygons, polygon_blocks
+from .plants import TOLERANCE, Block, explicit_blocks
+from .polygons import FaceRows, PolygonBlock, kept_polygons, polygon_blocks
 from .shells import proxy_shells
 
 Buffers = MeshBuffers | PointBuffers

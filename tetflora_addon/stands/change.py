@@ -24,8 +24,7 @@ from ..errors import TetFloraError
 from ..growth.hashing import child_key, key_of_seed, uniform
 from ..species.ecology import crown_leaves
 from .light import Crowns, LightGrid
-from .site import StandSite
-from .traits import StandTraits
+from .site import StandSite, StandTraits
 
 #: Tangent of the lean from which on a plant counts as lying.
 LYING = 20.0
@@ -119,7 +118,7 @@ class Plants(Arrays):
     #: x and y, (n,): meters from the corner of the site.
     x: Floats
     y: Floats
-    #: basal, height, base and radius, (n,): meters; basal diameter as `traits` has it.
+    #: basal, height, base and radius, (n,): meters; basal diameter as `site` has it.
     basal: Floats
     height: Floats
     base: Floats

@@ -18,8 +18,7 @@ from ..parallel import blocks, on_all_cores
 from ..parameters import script_setting, setting, within
 from .change import MOST_PLANTS, DeadPlants, Plants, Records, SeedDispersal, dying, fallen, grown, in_order, planted
 from .light import LightGrid
-from .site import StandSite
-from .traits import StandSpecies, StandTraits
+from .site import StandSite, StandSpecies, StandTraits
 
 #: Plants that are looked at together.
 _BLOCK = 1 << 15

@@ -14,7 +14,7 @@ from ...arrays import Floats
 from ...camera.camera import Camera
 from ...compiled.flora import Flora, compile_species
 from ...emission.budget import BYTES_PER_TRIANGLE
-from ...emission.expansion import expanded_faces
+from ...emission.estimate import expanded_faces
 from ...emission.light import Sources
 from ...errors import SceneError
 from ...growth.growth import trunks
