@@ -115,10 +115,6 @@ class PlacedClusters(FrontierKind):
         whole = self.placed.wholes()
         return ClusterRows.of(whole, self.originals.always[self.placed.instances.asset])
 
-    def spheres(self, rows: ClusterRows) -> tuple[Floats, Floats]:
-        """As of `FrontierKind`."""
-        return rows.center, rows.reach
-
     def optical(self, rows: ClusterRows) -> Floats:
         """As of `FrontierKind`; of what is drawn as it is, for facets that only tell what is covered."""
         return np.where(rows.shown, COVERING**-2.0, 1.0) * rows.totals.optical_area

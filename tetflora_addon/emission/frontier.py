@@ -79,7 +79,7 @@ class FrontierKind:
 
     def spheres(self, parts: Arrays) -> tuple[Floats, Floats]:
         """Middles (n, 3) of spheres around parts, and radii (n,), meters."""
-        raise NotImplementedError
+        return parts.center, parts.reach
 
     def prints(self, coverage: Coverage, slab: Waiting) -> Footprints:
         """What parts may touch of the image."""

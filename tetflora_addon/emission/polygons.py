@@ -76,10 +76,6 @@ class Faces(FrontierKind):
         bare.surfaces = ()
         return cls(bare, tuple(surface.look for surface in meshes.surfaces), camera, limit)
 
-    def spheres(self, rows: FaceRows) -> tuple[Floats, Floats]:
-        """As of `FrontierKind`."""
-        return rows.center, rows.reach
-
     def optical(self, rows: FaceRows) -> Floats:
         """As of `FrontierKind`: what is kept is one face, however large."""
         extent = self.camera.extent_around(rows.center)

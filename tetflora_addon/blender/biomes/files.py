@@ -27,6 +27,7 @@ from ..placing.population_data import (
     check_settings,
     check_species,
     check_text,
+    check_value,
     list_of,
     population_data,
     refuse_constant,
@@ -129,8 +130,7 @@ def checked(data: Any, identifier: str) -> Biome:
     check_settings('"limits"', data.get("limits", {}), TetFloraLayer, known)
     check_keys('"mask"', data.get("mask", {}), set(), set(MASK))
     check_settings('"mask"', data.get("mask", {}), TetFloraLayer, MASK)
-    if not isinstance(data.get("gives_way", True), bool):
-        raise ValueError(f'"gives_way" is {quoted(data["gives_way"])}; it must be true or false')
+    check_value('"gives_way"', TetFloraLayer.bl_rna.properties["gives_way"], data.get("gives_way", True))
     ground = data.get("ground", {})
     check_keys('"ground"', ground, set(), set(GROUND))
     for key, value in ground.items():
