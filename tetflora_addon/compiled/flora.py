@@ -25,10 +25,19 @@ from ..leaves.models import LeafModel
 from ..species.ages import with_habit
 from ..species.quality import with_quality
 from ..species.species import LEAF_KINDS, Species
-from .averages import Averages, RowLeaves, average, quadratic, row_leaves
+from .averages import (
+    Averages,
+    DayTotals,
+    RowLeaves,
+    ShapedTotals,
+    average,
+    quadratic,
+    row_leaves,
+    shaped_totals,
+    totals_of_day,
+)
 from .bounds import leaf_reaches, limb_reaches, sampled_bounds, unit_bounds, widest_radii
 from .clumping import Clumping, fit_clumping
-from .factors import DayTotals, ShapedTotals, shaped_totals, totals_of_day
 from .orientation import Orientation, orientation_of
 from .samples import Samples, draw_samples
 

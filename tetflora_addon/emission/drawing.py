@@ -30,12 +30,11 @@ from ..refinement.contents import polygon_totals
 from ..refinement.loop import Refinement
 from ..refinement.shared_parts import SharePoints
 from .asset_plan import PlacedClusters
-from .coverage import Coverage
+from .coverage import Coverage, Shade
 from .frontier import DETAIL, FEW, Frontier, FrontierKind, Shown, Waiting, Whose
 from .plant_parts import GrownPlants, PlantRows
 from .plants import Block, Transition
 from .polygons import FaceRows, Faces
-from .shade import Shade
 
 #: Least width of a tile, pixels, and pixels around it that its coverage knows.
 TILE, AROUND = 240, 64
