@@ -19,7 +19,7 @@ import gpu
 import numpy as np
 from numpy.typing import NDArray
 
-from ...arrays import Floats, Floats32, Integers
+from ...arrays import Floats, Floats32
 from ...camera.camera import Camera
 from ...preview.levels import FORMS, THICK, Level, Levels, as_shown, colors_of, drawable, project
 from ...preview.light_plants import CrownPoints, Shapes, nearest
@@ -55,7 +55,7 @@ def batch(kind: str, positions: NDArray, colors: NDArray, indices: NDArray) -> g
     return gpu.types.GPUBatch(type=kind, buf=corners, elem=elements)
 
 
-def chosen_by_worth(level: Level, forms: set[str], most: int) -> Integers:
+def chosen_by_worth(level: Level, forms: set[str], most: int) -> NDArray[np.intp]:
     """Places (k,) in a level of tetrahedra of some forms, at most so many, those that change most pixels first."""
     wanted = np.flatnonzero(np.isin(level.decision, [Decision[name] for name in forms]))
     if len(wanted) <= most:
@@ -156,6 +156,20 @@ def _crown_shader() -> gpu.types.GPUShader:
     return gpu.shader.create_from_info(info)
 
 
+def _draw_points(made: gpu.types.GPUBatch, origin: Floats, eye: Floats, least: float) -> None:
+    region, height = bpy.context.region_data, bpy.context.region.height
+    shader = _crown_shader()
+    with gpu.matrix.push_pop():
+        gpu.matrix.translate(origin.tolist())
+        shader.uniform_float("matrix", gpu.matrix.get_projection_matrix() @ gpu.matrix.get_model_view_matrix())
+        down = abs(region.view_matrix[2][2])
+        shader.uniform_float("view", (0.5 * height * region.window_matrix[1][1], down, 0.0, 0.0))
+        shader.uniform_float("eye", (*(eye - origin).tolist(), least))
+        gpu.state.program_point_size_set(True)
+        made.draw(shader)
+        gpu.state.program_point_size_set(False)
+
+
 def pyramid(camera: Camera, far: float, color: tuple[float, float, float, float]) -> gpu.types.GPUBatch:
     """Edges of what a camera sees between its near plane and a distance; its place and directions for a panorama."""
     if camera.kind == "PANO":
@@ -222,17 +236,7 @@ def _draw_plants(preview: Preview) -> None:
     gpu.state.face_culling_set('NONE')
     if shapes.crowns is not None:
         dots = _kept(preview, "points", (preview.made,), lambda: points(preview))
-        region, height = bpy.context.region_data, bpy.context.region.height
-        shader = _crown_shader()
-        with gpu.matrix.push_pop():
-            gpu.matrix.translate(shapes.origin.tolist())
-            shader.uniform_float("matrix", gpu.matrix.get_projection_matrix() @ gpu.matrix.get_model_view_matrix())
-            down = abs(region.view_matrix[2][2])
-            shader.uniform_float("view", (0.5 * height * region.window_matrix[1][1], down, 0.0, 0.0))
-            shader.uniform_float("eye", (*(eye - shapes.origin).tolist(), least))
-            gpu.state.program_point_size_set(True)
-            dots.draw(shader)
-            gpu.state.program_point_size_set(False)
+        _draw_points(dots, shapes.origin, eye, least)
     gpu.state.depth_mask_set(False)
 
 
