@@ -30,8 +30,7 @@ from tetflora_addon.species.catalog import load_species
 from tetflora_addon.species.ecology import ecology_of, one_sided
 from tetflora_addon.stands.change import Plants
 from tetflora_addon.stands.grow import StandSettings, begun
-from tetflora_addon.stands.site import StandSite
-from tetflora_addon.stands.traits import StandSpecies, StandTraits
+from tetflora_addon.stands.site import StandSite, StandSpecies, StandTraits
 
 from .pictures import coverage
 from .report import Targets

@@ -37,8 +37,7 @@ from tetflora_addon.blender.scene.fields import write_field
 from tetflora_addon.species.catalog import load_species
 from tetflora_addon.stands.change import Records
 from tetflora_addon.stands.grow import StandSettings, begun
-from tetflora_addon.stands.site import StandSite
-from tetflora_addon.stands.traits import StandSpecies, StandTraits
+from tetflora_addon.stands.site import StandSite, StandSpecies, StandTraits
 
 from .pictures import read_picture, render, timed_refine
 from .report import ROOT, Targets, peak_mb, records_of

@@ -24,8 +24,7 @@ from tetflora_addon.growth.hashing import key_of_seed, uniform
 from tetflora_addon.species.ages import ages_of, with_age
 from tetflora_addon.species.catalog import load_species
 from tetflora_addon.stands.grow import StandSettings, begun
-from tetflora_addon.stands.site import StandSite
-from tetflora_addon.stands.traits import StandSpecies, StandTraits
+from tetflora_addon.stands.site import StandSite, StandSpecies, StandTraits
 
 from .report import ROOT, Targets, forget_peak, peak_mb, records_of
 

@@ -113,7 +113,15 @@ class TETFLORA_OT_first_forest(Reporting, bpy.types.Operator):
 
     def run(self, context: bpy.types.Context) -> set[str]:
         scene, note = build(context, self.seed)
-        _activate_ground(scene)
+        # Select the ground, so that Scatter and the brush go on from there, and not the startup's hidden cube.
+        layer = scene.view_layers[0]
+        layer.update()  # what was just linked is not in it before
+        ground = next((obj for obj in layer.objects if obj.tetflora.is_occluder), None)
+        if ground is not None:
+            for obj in layer.objects.selected:
+                obj.select_set(False, view_layer=layer)
+            ground.select_set(True, view_layer=layer)
+            layer.objects.active = ground
         plants = sum(o.tetflora.is_plant for o in scene.objects)
         screen = context.screen
         for area in screen.areas if screen and not bpy.app.background else ():
@@ -123,18 +131,6 @@ class TETFLORA_OT_first_forest(Reporting, bpy.types.Operator):
         return self.done(
             f"Created a forest of {plants} plants{note}. Press F12 to render it, click Refine to see it here"
         )
-
-
-def _activate_ground(scene: bpy.types.Scene) -> None:
-    """Select the ground, so that Scatter and the brush go on from there, and not the startup's hidden cube."""
-    layer = scene.view_layers[0]
-    layer.update()  # what was just linked is not in it before
-    ground = next((obj for obj in layer.objects if obj.tetflora.is_occluder), None)
-    if ground is not None:
-        for obj in layer.objects.selected:
-            obj.select_set(False, view_layer=layer)
-        ground.select_set(True, view_layer=layer)
-        layer.objects.active = ground
 
 
 # What is not given comes from the panel's settings: defaults do not matter here.
@@ -173,7 +169,15 @@ class TETFLORA_OT_populate(ModalJob, bpy.types.Operator):
     def steps(self, context: bpy.types.Context) -> Job[PlacedPlants]:
         scene = context.scene
         yield Progress(0.0, "Reading the ground")
-        self._complete_from(scene)
+        # Take what was not given from the panel; the redo panel then shows what was really used.
+        settings = scene.tetflora.populate
+        if self.properties.is_property_set("count") and not self.properties.is_property_set("by_density"):
+            self.by_density = False  # a script asks for so many
+        for name in _SHARED:
+            if not self.properties.is_property_set(name) and name != "min_distance":
+                setattr(self, name, getattr(settings, name))
+        if not self.species:
+            self.species = mix_in(settings)
         weights = parse_weights(self.species)
         if self.as_field == 'EMPTIES' and self.count > MOST_EMPTIES:
             raise SceneError(
@@ -214,17 +218,6 @@ class TETFLORA_OT_populate(ModalJob, bpy.types.Operator):
         if follows:  # the redo panel shows it, and tells by it whether the artist has changed it
             self.min_distance = self.suited = distance_of(population)
         return population
-
-    def _complete_from(self, scene: bpy.types.Scene) -> None:
-        """Take what was not given from the panel; the redo panel then shows what was really used."""
-        settings = scene.tetflora.populate
-        if self.properties.is_property_set("count") and not self.properties.is_property_set("by_density"):
-            self.by_density = False  # a script asks for so many
-        for name in _SHARED:
-            if not self.properties.is_property_set(name) and name != "min_distance":
-                setattr(self, name, getattr(settings, name))
-        if not self.species:
-            self.species = mix_in(settings)
 
 
 def mix_in(settings: bpy.types.PropertyGroup) -> str:

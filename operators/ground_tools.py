@@ -398,7 +398,10 @@ class TETFLORA_OT_paint_plants(GroundTool, bpy.types.Operator):
     def _drag(self, context: bpy.types.Context, event: bpy.types.Event) -> None:
         self._dab(context, self._hit[0], event.pressure if event.is_tablet else 1.0)
         if self._stroke.pending and time.monotonic() - self._shown > _PATIENCE * self._cost:
-            self._flush()
+            begin = time.monotonic()
+            self._stroke.flush()
+            self._shown = time.monotonic()
+            self._cost = self._shown - begin
 
     def _dab(self, context: bpy.types.Context, place: tuple[float, float, float], pressure: float) -> None:
         if self._last is None:
@@ -408,12 +411,6 @@ class TETFLORA_OT_paint_plants(GroundTool, bpy.types.Operator):
         for center in way:
             self._stroke.dab(center, pressure)
         self._last = tuple(place)
-
-    def _flush(self) -> None:
-        begin = time.monotonic()
-        self._stroke.flush()
-        self._shown = time.monotonic()
-        self._cost = self._shown - begin
 
     def _end_stroke(self, context: bpy.types.Context) -> None:
         stroke, self._stroke = self._stroke, None

@@ -81,7 +81,9 @@ class TETFLORA_OT_select_plants(Reporting, bpy.types.Operator):
 
     def run(self, context: bpy.types.Context) -> set[str]:
         if self.layer:
-            found = self._of_layer(context.scene)
+            layer, found = active_layer(context.scene), []
+            for one in () if layer is None else (layer, *children_of(layer)):
+                found += own_objects(context.scene, one) if one.kind == SCATTER else [one.field] if one.field else []
             if not found:
                 return self.refused("The layer has no plants; click Update")
         else:
@@ -99,13 +101,6 @@ class TETFLORA_OT_select_plants(Reporting, bpy.types.Operator):
                 obj.select_set(True)
         of = "" if self.layer else f' of species "{self.species}"'
         return self.done(f"{counted(len(found), 'plant')}{of} selected")
-
-    @staticmethod
-    def _of_layer(scene: bpy.types.Scene) -> list[bpy.types.Object]:
-        layer, found = active_layer(scene), []
-        for one in () if layer is None else (layer, *children_of(layer)):
-            found += own_objects(scene, one) if one.kind == SCATTER else [one.field] if one.field else []
-        return found
 
 
 class TETFLORA_OT_remove_plants(Reporting, bpy.types.Operator):

@@ -76,8 +76,10 @@ class TETFLORA_OT_refine(ModalJob, bpy.types.Operator):
         if not statistics.complete and statistics.passes:
             self.report({'INFO'}, "Stopped early; click Refine again to complete the result")
         outside = cut_off(context.scene)[0] or _unseen(context.scene, statistics)
+        # The first warnings, and how many more there are.
+        more = len(asset_warnings) - _WARNINGS
         for warning in (
-            *_few_of(asset_warnings),
+            *([*asset_warnings[:_WARNINGS], f"{more:,} more warnings about assets"] if more > 1 else asset_warnings),
             statistics.left_out,
             statistics.coarser,
             outside,
@@ -87,12 +89,6 @@ class TETFLORA_OT_refine(ModalJob, bpy.types.Operator):
             if warning:
                 self.report({'WARNING'}, warning)
         return {'FINISHED'}
-
-
-def _few_of(warnings: list[str]) -> list[str]:
-    """The first warnings, and how many more there are."""
-    more = len(warnings) - _WARNINGS
-    return [*warnings[:_WARNINGS], f"{more:,} more warnings about assets"] if more > 1 else warnings
 
 
 def _made(scene: bpy.types.Scene, statistics: Statistics) -> str:

@@ -50,28 +50,6 @@ def items() -> list[tuple[bpy.types.KeyMap, bpy.types.KeyMapItem]]:
     ]
 
 
-def add_keys() -> None:
-    """Add the keys, where there is a configuration for add-ons (not in every background Blender)."""
-    config = bpy.context.window_manager.keyconfigs.addon
-    if config is None:
-        return
-    keymap = config.keymaps.new(name=KEYMAP, space_type='EMPTY')
-    for key in KEYS:
-        item = keymap.keymap_items.new(
-            key.operator, key.key, 'PRESS', ctrl=int(key.ctrl), alt=int(key.alt), shift=int(key.shift)
-        )
-        if key.menu:
-            item.properties.name = key.menu
-        _made.append((keymap, item))
-
-
-def remove_keys() -> None:
-    """Take the keys back."""
-    for keymap, item in reversed(_made):
-        keymap.keymap_items.remove(item)
-    _made.clear()
-
-
 def _draw(self: TetFloraPreferences, context: bpy.types.Context) -> None:
     layout = self.layout
     layout.use_property_split = True
@@ -114,10 +92,22 @@ def _draw_keys(column: bpy.types.UILayout, context: bpy.types.Context) -> None:
 def register() -> None:
     """Draw the page, whose class only stores the settings, and add the keys."""
     TetFloraPreferences.draw = _draw
-    add_keys()
+    config = bpy.context.window_manager.keyconfigs.addon
+    if config is None:  # as in some background Blenders
+        return
+    keymap = config.keymaps.new(name=KEYMAP, space_type='EMPTY')
+    for key in KEYS:
+        item = keymap.keymap_items.new(
+            key.operator, key.key, 'PRESS', ctrl=int(key.ctrl), alt=int(key.alt), shift=int(key.shift)
+        )
+        if key.menu:
+            item.properties.name = key.menu
+        _made.append((keymap, item))
 
 
 def unregister() -> None:
     """Remove the keys, and draw the page no longer."""
-    remove_keys()
+    for keymap, item in reversed(_made):
+        keymap.keymap_items.remove(item)
+    _made.clear()
     del TetFloraPreferences.draw

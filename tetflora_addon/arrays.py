@@ -64,7 +64,7 @@ def linear_of(stored: NDArray[np.floating]) -> NDArray[np.floating]:
     return np.where(stored <= 0.04045, stored / 12.92, ((stored + 0.055) / 1.055) ** 2.4)
 
 
-def bilinear(values: NDArray[np.floating], place: NDArray[np.floating]) -> NDArray[np.float64]:
+def bilinear(values: NDArray[np.floating], place: NDArray[np.floating]) -> Floats:
     """Values (n,) of a grid (h, w) at places (n, 2) in columns and rows, linear between; beyond, of its border."""
     rows, columns = values.shape
     place = np.clip(place, 0.0, (columns - 1, rows - 1))
@@ -76,7 +76,7 @@ def bilinear(values: NDArray[np.floating], place: NDArray[np.floating]) -> NDArr
     return bottom * (1.0 - rise) + top * rise
 
 
-def smoothstep(x: NDArray[np.float64], low: float = 0.0, high: float = 1.0) -> NDArray[np.float64]:
+def smoothstep(x: Floats, low: float = 0.0, high: float = 1.0) -> Floats:
     """0 up to ``low``, 1 from ``high`` on, without a bend between (Hermite)."""
     part = np.clip((x - low) / (high - low), 0.0, 1.0)
     return part * part * (3.0 - 2.0 * part)
@@ -172,7 +172,7 @@ def gathered(array: NDArray, index: NDArray | slice) -> NDArray:
     return picked.transpose(-1, *(order.index(axis) for axis in range(1, array.ndim)))
 
 
-def spread(counts: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+def spread(counts: Integers) -> tuple[Integers, Integers]:
     """Owner (m,) and running index within the owner (m,) for ``counts`` things each; m is their sum."""
     owner = np.repeat(np.arange(len(counts)), counts)
     first = np.cumsum(counts) - counts
@@ -188,7 +188,7 @@ def chunks(counts: NDArray, limit: float) -> Iterator[slice]:
             yield slice(int(start), int(stop))
 
 
-def connected(n: int, a: Integers, b: Integers) -> NDArray[np.int32]:
+def connected(n: int, a: Integers, b: Integers) -> Integers32:
     """(n,) smallest index in the part of each of n things, of which a (e,) and b (e,) are connected."""
     label = np.arange(n, dtype=np.int32)
     while True:
@@ -208,13 +208,13 @@ def top(up: Integers) -> Integers:
     return up
 
 
-def rows_within(chosen: NDArray[np.bool_], index: NDArray[np.int32]) -> NDArray[np.intp]:
+def rows_within(chosen: Mask, index: Integers32) -> Integers:
     """Rows (k,), ascending, of which an index (n,) is among those of a mask."""
     found = [np.flatnonzero(np.take(chosen, index[block])) + block.start for block in blocks(len(index), _BATCH)]
     return np.concatenate([np.zeros(0, np.intp), *found])
 
 
-def renumber(index: NDArray[np.int32], number: NDArray[np.int32]) -> None:
+def renumber(index: Integers32, number: Integers32) -> None:
     """Replace an index (n,), in place, by the new numbers (m,) of what it points to."""
     for block in blocks(len(index), _BATCH):
         index[block] = np.take(number, index[block])
@@ -342,7 +342,7 @@ class Growing(Generic[Rows]):
                 self._columns[name] = own = wider
             own[start : self._number] = getattr(new, name)
 
-    def exchange(self, gone: NDArray[np.intp], new: Rows) -> None:
+    def exchange(self, gone: Integers, new: Rows) -> None:
         """Drop rows (k,), ascending, and put new things in their places first, then behind all others.
 
         Those that stay keep their order, and so do new ones: what is in one order stays so.
@@ -355,7 +355,7 @@ class Growing(Generic[Rows]):
         elif len(gone) > len(new):
             self._drop(gone[len(new) :])
 
-    def _drop(self, gone: NDArray[np.intp]) -> None:
+    def _drop(self, gone: Integers) -> None:
         """Move up all that is behind rows (k,) that are dropped; rare, as what is opened is more than it was."""
         first, kept = int(gone[0]), np.ones(self._number, bool)
         kept[gone] = False
@@ -388,7 +388,7 @@ class Chunks(Generic[Rows]):
         self._there.append(np.ones(len(new), bool))
         self._number += len(new)
 
-    def take_out(self, rows: NDArray[np.intp]) -> Rows:
+    def take_out(self, rows: Integers) -> Rows:
         """Mark and return rows (k,), ascending, none of which is marked."""
         out, start = [], 0
         ends = np.cumsum([len(chunk) for chunk in self._chunks])
@@ -402,11 +402,11 @@ class Chunks(Generic[Rows]):
         return self.kind.concatenate(out or [self._chunks[0].take(slice(0))])
 
     @property
-    def there(self) -> NDArray[np.bool_]:
+    def there(self) -> Mask:
         """Rows (n,) that are not marked."""
         return np.concatenate(self._there)
 
-    def chunks(self) -> Iterator[tuple[Rows, NDArray[np.bool_]]]:
+    def chunks(self) -> Iterator[tuple[Rows, Mask]]:
         """Each chunk (k), and which of its rows (k,) are not marked."""
         return zip(self._chunks, self._there, strict=True)
 

@@ -2,12 +2,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Jobs: generators that yield their progress and return a result, so that a window can draw between two steps."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable, Generator
 from dataclasses import dataclass, replace
-from typing import Any, TypeVar
+from typing import Any, Self, TypeVar
 
 _Item, _Step, _Result = TypeVar("_Item"), TypeVar("_Step"), TypeVar("_Result")
 #: What a job works between two redraws, in times of what the last redraw took, and at most, seconds: Esc waits for it.
@@ -25,11 +23,11 @@ class Progress:
     waiting: bool = False  # whether nothing is new: the next step waits as well
 
     @property
-    def repeated(self) -> Progress:
+    def repeated(self) -> Self:
         """The same, while nothing is new."""
         return replace(self, waiting=True)
 
-    def during(self, steps: Generator[object, None, _Result]) -> Generator[Progress, object, _Result]:
+    def during(self, steps: Generator[object, None, _Result]) -> Generator[Self, object, _Result]:
         """The same after each of some small steps; returns what these return."""
         return mapped(steps, lambda _: self)
 

@@ -6,13 +6,11 @@ Species files are read and documented by them: the annotation of a field says ho
 default is used where the file has none. Settings carry what an interface needs: a label, a tooltip, limits, a unit.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import MISSING, Field, dataclass, field, fields, replace
 from difflib import get_close_matches
 from functools import cache
-from typing import Any, NamedTuple, TypeVar
+from typing import Any, NamedTuple, Self, TypeVar
 
 from .errors import NAME, SpeciesError, quoted, readable
 
@@ -54,11 +52,6 @@ def meters(low: float, soft: float, high: float | None = None) -> dict[str, Any]
 
 Rgb = tuple[float, float, float]
 Declared = TypeVar("Declared")
-#: How fields are written, by their annotations as text: files that declare any have these evaluated late.
-KINDS = {
-    "Range": "range", "float": "number", "int": "integer", "str": "text", "bool": "truth", "Color": "color",
-    "Rgb": "rgb", "Rgb | None": "rgb", "tuple[float, float]": "pair",
-}  # fmt: skip
 
 
 class Range(NamedTuple):
@@ -77,11 +70,11 @@ class Range(NamedTuple):
         """Largest possible value."""
         return self.mean + self.variation
 
-    def scaled(self, factor: float) -> Range:
+    def scaled(self, factor: float) -> Self:
         """The same times a factor."""
         return Range(factor * self.mean, factor * self.variation)
 
-    def allowed(self, factor: float, key: Key) -> float:
+    def allowed(self, factor: float, key: "Key") -> float:
         """The factor, or the nearest to it that keeps a range with a mean above 0 within the limits of a key."""
         if self.high > 0:
             factor = min(factor, key.high / self.high)
@@ -97,6 +90,13 @@ class Color(NamedTuple):
 
     mean: Rgb
     variation: Rgb
+
+
+#: How fields are written, by their annotations.
+KINDS = {
+    Range: "range", float: "number", int: "integer", str: "text", bool: "truth", Color: "color",
+    Rgb: "rgb", Rgb | None: "rgb", tuple[float, float]: "pair",
+}  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -121,11 +121,11 @@ class Key:
     field: str = ""
     needed: bool = False
 
-    def of(self, one: Field) -> Key:
+    def of(self, one: Field) -> Self:
         """The same with what the field itself says."""
         needed = one.default is MISSING and not self.follows
         default = None if one.default is MISSING else one.default
-        kind = "choice" if self.choices else KINDS.get(one.type, one.type)
+        kind = "choice" if self.choices else KINDS.get(one.type) or one.type.__name__
         return replace(self, kind=kind, default=default, field=one.name, needed=needed)
 
 

@@ -249,7 +249,11 @@ def memoized(most_bytes: int) -> Callable[[Callable[..., Arrays]], Callable[...,
 
         @wraps(function)
         def memo(*given: NDArray) -> Arrays:
-            key = _digest(given)
+            content = hashlib.sha256()
+            for array in given:
+                content.update(f"{array.dtype}{array.shape}".encode())
+                content.update(np.ascontiguousarray(array))
+            key = content.digest()
             found = kept.pop(key, None)
             if found is None:
                 found = tuple(np.array(result) for result in function(*given))
@@ -269,11 +273,3 @@ def memoized(most_bytes: int) -> Callable[[Callable[..., Arrays]], Callable[...,
 
 def _size(arrays: Arrays) -> int:
     return sum(array.nbytes for array in arrays)
-
-
-def _digest(arrays: Arrays) -> bytes:
-    content = hashlib.sha256()
-    for array in arrays:
-        content.update(f"{array.dtype}{array.shape}".encode())
-        content.update(np.ascontiguousarray(array))
-    return content.digest()

@@ -5,11 +5,10 @@
 What an asset is before it is compiled: all of its faces, in its own space, and what each of them looks like.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -159,7 +158,7 @@ class AssetTable:
     root: Integers  # (a + 1,): first cluster of each, and their number
 
     @classmethod
-    def of(cls, assets: Sequence[Asset]) -> AssetTable:
+    def of(cls, assets: Sequence[Asset]) -> Self:
         """All of some."""
         root = np.cumsum([0, *(len(a.clusters) for a in assets)])
         sample = np.cumsum([0, *(len(a.samples) for a in assets)])
@@ -186,7 +185,7 @@ class AssetTable:
         return {name: value for name, value in vars(self).items() if name != "leaves"} | {"every": every}
 
     @classmethod
-    def none(cls) -> AssetTable:
+    def none(cls) -> Self:
         """No assets."""
         return cls.of(())
 
@@ -227,7 +226,7 @@ class Instances(Arrays):
     position: Floats = column(3)  # (n, 3): of the asset's origin, meters
     key: NDArray[np.uint64] = column(dtype=np.uint64)  # (n,): tells individuals apart
 
-    def counted_from(self, origin: Floats) -> Instances:
+    def counted_from(self, origin: Floats) -> Self:
         """The same in coordinates that begin at a place (3,)."""
         return replace(self, position=self.position - origin) if origin.any() else self
 

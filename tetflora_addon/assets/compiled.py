@@ -11,13 +11,11 @@ more). Parallel rays are cast through the triangles of some clusters of each dep
 transparent, and through facets at their samples, as many as there may be.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Generator, Iterator
 from dataclasses import dataclass, replace
+from typing import Self
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..arrays import Floats, Integers, perpendicular, unit
 from ..compiled.rays import basis, covered
@@ -82,14 +80,14 @@ class _View:
     step: float
 
     @classmethod
-    def of(cls, clusters: Clusters, cluster: int, direction: Floats) -> _View:
+    def of(cls, clusters: Clusters, cluster: int, direction: Floats) -> Self:
         u, v = basis(direction / np.linalg.norm(direction))
         bound = np.stack([clusters.low[cluster], clusters.high[cluster]])
         box = np.stack(np.meshgrid(*bound.T, indexing="ij"), -1).reshape(-1, 3)
         flat = np.stack([box @ u, box @ v], axis=1)
         return cls(u, v, flat.min(axis=0), max(float(np.ptp(flat, axis=0).max()), 1e-12) / RAYS)
 
-    def met(self, corners: Floats) -> tuple[NDArray[np.intp], Integers]:
+    def met(self, corners: Floats) -> tuple[Integers, Integers]:
         """Triangles (k,) of some (t, 3, 3), and rays (k, 2), that meet."""
         flat = (np.stack([corners @ self.u, corners @ self.v], axis=-1).reshape(-1, 2) - self.origin) / self.step
         first = np.arange(0, len(flat), 3)
@@ -191,7 +189,7 @@ def compile_steps(source: AssetSource) -> Generator[float, None, Asset]:
     )
 
 
-def _smallest(hierarchy: Hierarchy) -> tuple[NDArray[np.intp], Integers]:
+def _smallest(hierarchy: Hierarchy) -> tuple[Integers, Integers]:
     """Clusters (k,) without children, in their order, and which of these each cluster has: (2, c), first and end."""
     small = np.flatnonzero(hierarchy.children == 0)
     small = small[np.argsort(hierarchy.first[small], kind="stable")]

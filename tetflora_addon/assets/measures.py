@@ -306,7 +306,7 @@ def well_spread(counts: Integers) -> tuple[Integers, Integers]:
 
 
 def _samples(
-    run: Run, owner: Integers, start: NDArray[np.intp], optical: Floats, normal: NDArray
+    run: Run, owner: Integers, start: Integers, optical: Floats, normal: NDArray
 ) -> tuple[SurfaceSamples, Integers]:
     """Samples of equal areas on leaves, and on wood, of the clusters of a run; leaves first, cluster by cluster."""
     kinds = [np.where(run.woody, 0.0, optical), np.where(run.woody, optical, 0.0)]

@@ -149,17 +149,14 @@ def _along_a_curve(
     cell = (corners - low) / max(float((corners.max(axis=0) - low).max()), 1e-30) * ((1 << _BITS) - 1)
     code = np.zeros(len(at), np.int64)
     for axis in range(3):
-        code |= _spaced(cell[:, axis].astype(np.int64)) << axis
+        # Bits of numbers (n,) below 1,024 with two zeros between them.
+        value = cell[:, axis].astype(np.int64)
+        value = (value | value << 16) & 0x030000FF
+        value = (value | value << 8) & 0x0300F00F
+        value = (value | value << 4) & 0x030C30C3
+        code |= ((value | value << 2) & 0x09249249) << axis
     order = np.lexsort([face, code, owner])
     return at, at[order]
-
-
-def _spaced(value: Integers) -> Integers:
-    """Bits of numbers (n,) below 1,024 with two zeros between them."""
-    value = (value | value << 16) & 0x030000FF
-    value = (value | value << 8) & 0x0300F00F
-    value = (value | value << 4) & 0x030C30C3
-    return (value | value << 2) & 0x09249249
 
 
 #: Triangles up to which a cluster has no children.

@@ -71,13 +71,13 @@ def read(geometry: Geometry, name: str) -> NDArray:
         There is no such attribute.
     """
     attribute = geometry.attributes.get(name)
-    return _empty(KINDS[_BUILT_IN[name]], 0) if attribute is None else values_of(attribute)
+    return empty(KINDS[_BUILT_IN[name]], 0) if attribute is None else values_of(attribute)
 
 
 def values_of(attribute: bpy.types.Attribute, field: str = "") -> NDArray:
     """Values as stored, (n,) or (n, width), in the type's own dtype; of another field of the elements if named."""
     kind = KINDS[attribute.data_type]
-    values = _empty(kind, len(attribute.data))
+    values = empty(kind, len(attribute.data))
     attribute.data.foreach_get(field or kind.field, values.reshape(-1))
     return values
 
@@ -108,12 +108,13 @@ def members(
     collection: bpy.types.bpy_prop_collection, name: str, width: int = 1, dtype: DTypeLike = np.float32
 ) -> NDArray:
     """A property of all members of a collection, (n,) or (n, width)."""
-    values = _empty(AttributeType(name, dtype, width), len(collection))
+    values = empty(AttributeType(name, dtype, width), len(collection))
     collection.foreach_get(name, values.reshape(-1))
     return values
 
 
-def _empty(kind: AttributeType, size: int) -> NDArray:
+def empty(kind: AttributeType, size: int) -> NDArray:
+    """Zeros in place of so many values of a type, (n,) or (n, width)."""
     return np.zeros(size if kind.width == 1 else (size, kind.width), kind.dtype)
 
 

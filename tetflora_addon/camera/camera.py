@@ -15,10 +15,8 @@ Boxes and silhouettes of tetrahedra and triangles are projected to its window wi
 space (x right, y up, depth), meters; the *window* is the image at depth 1 (``'PERSP'``) or in meters (``'ORTHO'``).
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field, replace
-from typing import Literal
+from typing import Literal, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -67,7 +65,7 @@ class Camera:
     lens_radius: float = 0.0  # radius of the lens, meters; 0 where all is sharp
     focus: float = np.inf  # depth that is sharp, meters
     #: The camera at other times while the shutter is open, and the other eyes of a stereoscopic image; often empty.
-    shutter: tuple[Camera, ...] = ()
+    shutter: tuple[Self, ...] = ()
     #: How far, in depth, the position lies behind the eye, meters: not 0 where the camera stands for several.
     setback: float = 0.0
     #: Largest distance from that eye to the others that the camera stands for, meters; see `view_cells`.
@@ -75,11 +73,11 @@ class Camera:
     #: (3,): where in the world coordinates begin, meters: those of the camera, and of all that is refined for it.
     origin: Floats = field(default_factory=lambda: np.zeros(3))
 
-    def local(self) -> Camera:
+    def local(self) -> Self:
         """The same camera in coordinates that begin near it."""
         return self.counted_from(origin_near(self.position + self.origin))
 
-    def counted_from(self, origin: Floats) -> Camera:
+    def counted_from(self, origin: Floats) -> Self:
         """The same camera in coordinates that begin at a place (3,) in the world."""
         by = origin - self.origin
         if not by.any():
@@ -87,7 +85,7 @@ class Camera:
         shutter = tuple(other.counted_from(origin) for other in self.shutter)
         return replace(self, position=self.position - by, shutter=shutter, origin=origin)
 
-    def smaller(self, most: int) -> Camera:
+    def smaller(self, most: int) -> Self:
         """The same camera with an image of so many pixels at most on its longer side."""
         size = min(most / max(self.width, self.height), 1.0)
         width, height = max(round(size * self.width), 1), max(round(size * self.height), 1)
@@ -132,7 +130,7 @@ class Camera:
         ]
         return np.max([distance / np.hypot(1.0, slope) for distance, slope in walls], axis=0)
 
-    def widened(self, margin: float, margin_up: float | None = None) -> Camera:
+    def widened(self, margin: float, margin_up: float | None = None) -> Self:
         """The same camera with more around its image.
 
         Parameters

@@ -11,10 +11,9 @@ All cameras of a cell are replaced by one that sees whatever any of them sees: i
 wider, and it takes everything to be as near as it is to the nearest of them.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from itertools import product
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -89,7 +88,7 @@ class _Turns:
     step: float
 
     @classmethod
-    def around(cls, frame: Floats, turn: float) -> _Turns:
+    def around(cls, frame: Floats, turn: float) -> Self:
         """The cell in which a rotation (3, 3) is; cells are ``turn`` radians wide."""
         largest = int(np.argmax(np.abs(_product(_BEFORE, quaternions(frame[None])[0]))))
         step = turn / 2.0  # an angle is twice that between quaternions

@@ -4,6 +4,14 @@
 
 Every total is kept by the row that contributes it, so that colors and fractions follow by a product. What depends on
 how far outside in the crown a sub-plant sits is known at three places, `NODES`, and quadratic between them.
+
+Factors on them are by crown shape, and by kind of leaf on a day of the year. A crown's base decides how many limbs
+there are and which of the crown's lengths these have; for some bases that is integrated once. In the factor on the
+lengths of limbs totals are polynomials: numbers of what follows the length are linear, the surface of wood that does so
+quadratic. Limbs set out in all directions, so that of the lean to one side only the mean square counts.
+
+On a day of the year there are totals in summer by kind of leaf, times what the day leaves of them. Tables of days are
+those of `growth.seasons`; nothing is measured anew for a day.
 """
 
 from collections.abc import Callable, Sequence
@@ -13,16 +21,27 @@ from operator import attrgetter
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import Floats, Integers, Table
+from ..arrays import Floats, Integers, Mask, Table, gathered
+from ..growth import seasons
 from ..growth.axes import profile, profile_integral
+from ..growth.crown_effects import (
+    LIGHT,
+    are_stools,
+    bare_part,
+    dead_end,
+    lateral_fractions,
+    limb_count_factors,
+    trunk_length_factors,
+)
 from ..growth.foliage import YOUTH
-from ..growth.grown_rows import NOW, fullness_of, lengths, spread_children
+from ..growth.grown_rows import NOW, fullness_of, lengths, living, spread_children
 from ..growth.rows import DEAD, FORK, LATERAL, SPUR
+from ..growth.seeds import BASE, LEAVES, MOST, WIDTH, Branches
 from ..leaves.levels import hidden_gloss
 from ..leaves.models import LeafModel
 from ..species.growing import EVEN
 from ..species.members import dead_vigor, expected_forks
-from ..species.species import Range
+from ..species.species import LEAF_KINDS, Range, Species
 
 NODES = np.array([0.0, 0.5, 1.0])
 _GAUSS, _WEIGHTS = (part / 2 for part in np.polynomial.legendre.leggauss(8))
@@ -286,3 +305,343 @@ def _fork_sums(rows: Table, i: int) -> _Sums:
     return _Sums(
         number, number, wood, wood, number * np.eye(3), length, float(tip * number ** (-1 / row["fork_power"]))
     )
+
+
+_BASES = np.linspace(0.0, MOST[BASE], 39)
+_ABSCISSAS = np.polynomial.legendre.leggauss(5)[0]
+_MEANS = np.polynomial.legendre.leggauss(5)[1] / 2
+KINDS = len(LEAF_KINDS)
+#: Columns of totals: area and faces of leaves of each kind, faces and surface of branches, and what of that is of short
+#: shoots.
+_AREA, _LEAF_FACES, _LEAVES = slice(KINDS), slice(KINDS, 2 * KINDS), slice(2 * KINDS)
+_FACES, _WOOD, _SPURS, _TOTALS = range(2 * KINDS, 2 * KINDS + 4)
+_OF_WOOD = ("fixed_faces", "full_faces", "fixed_wood", "full_wood", "spur_wood")
+
+
+@dataclass(frozen=True)
+class ShapedTotals:
+    """Totals of sub-plants that are trunks, or stems of these, for some crown bases."""
+
+    shaped: Mask  # (r,): rows that crown shapes change
+    #: (r, b, 3, t): of what follows the power 0, 1 or 2 of the factor on the lengths of limbs, for `_BASES`.
+    power: Floats
+    borne: Floats  # (r, b, 3, t): what of that limbs bear
+
+    def leaves(self, subplants: Branches, faces: bool = False, kinds: bool = False) -> Floats:
+        """Area or number of faces (n,) of leaves of sub-plants over that of plants as described; (n, k) by kind."""
+        some = _LEAF_FACES if faces else _AREA
+        own, plain = (one[:, some] if kinds else one[:, some].sum(axis=1) for one in self._values(subplants))
+        return _over(own, plain)
+
+    def faces(self, subplants: Branches) -> Floats:
+        """Faces (n,) of branches, likewise."""
+        return _over(*(one[:, _FACES] for one in self._values(subplants)))
+
+    def wood(self, subplants: Branches) -> tuple[Floats, Floats]:
+        """Surface (n,) over length × radius, and that of short shoots (n,), likewise."""
+        own, plain = self._values(subplants)
+        return _over(own[:, _WOOD], plain[:, _WOOD]), _over(own[:, _SPURS], plain[:, _SPURS])
+
+    def _values(self, subplants: Branches) -> tuple[Floats, Floats]:
+        """Totals (n, t) of sub-plants that are formed, and of the same as described."""
+        crown, row = subplants.crown.astype(np.float64), subplants.row
+        step = crown[:, BASE] / (_BASES[1] - _BASES[0])
+        low = np.minimum(step.astype(np.int64), len(_BASES) - 2)
+        part, fewer = (step - low)[:, None, None], np.tile(1.0 - crown[:, LEAVES, None, None], (1, 1, _TOTALS))
+        fewer[:, :, 2 * KINDS :] = 1.0 - np.sqrt(crown[:, LEAVES, None, None])
+        power, borne = ((1 - part) * all_[row, low] + part * all_[row, low + 1] for all_ in (self.power, self.borne))
+        power = power - fewer * borne
+        square = 1 + (crown[:, LIGHT][:, :2] ** 2).sum(axis=1) / 2
+        width = crown[:, WIDTH]
+        factors = np.stack([np.ones(len(row)), width, width**2 * square], axis=1)[:, :, None]
+        plain = self.power[row, 0]
+        return (factors * power).sum(axis=1), (np.ones((1, 3, 1)) * plain).sum(axis=1)
+
+
+def _over(own: Floats, plain: Floats) -> Floats:
+    return np.where(plain > 0, own / np.where(plain > 0, plain, 1.0), 1.0)
+
+
+def shaped_totals(rows: Table, totals: Averages, polygons: Floats) -> ShapedTotals:
+    """Totals of all rows.
+
+    Parameters
+    ----------
+    rows : (r,) parameter table
+    totals : Averages
+        Of plants as described.
+    polygons : (r,) float64
+        Faces of a leaf of each row.
+    """
+    every = np.arange(len(rows))
+    bearing = (rows["next"][:, (LATERAL, DEAD, FORK)] >= 0).any(axis=1)
+    solid = rows["phantom"] | rows["drawn"] | (rows["envelope"] > 0)
+    shaped = (rows["order"] == 0) & bearing & ~solid & ~are_stools(rows, every)
+    power, borne = np.zeros((2, len(rows), len(_BASES), 3, _TOTALS))
+    kinds = np.arange(KINDS) == rows["leaf_kind"][:, None]
+    all_leaves = np.concatenate([totals.leaf_area[:, 1] @ kinds, (totals.leaves * polygons) @ kinds], axis=1)
+    exact = rows.copy()
+    exact["taper"][:, 1] = 0
+    for i in np.flatnonzero(shaped)[::-1]:  # stems before what they grow on
+        own, on_limbs = power[i], borne[i]
+        own[:, 0, _AREA] += totals.leaf_area[i, 1, i] * kinds[i]
+        own[:, 0, _LEAF_FACES] += totals.leaves[i, i] * polygons[i] * kinds[i]
+        own[:, 0, _FACES] += totals.fixed_faces[i, i]
+        own[:, 0, _WOOD] += totals.fixed_wood[i, i]
+        below, above = trunk_length_factors(_BASES, rows["part"][np.argmax(rows["species"] == rows["species"][i]), 1])
+        stretch = above if rows["continues"][i] else below
+        for sort in np.flatnonzero(rows["next"][i] >= 0):
+            j = rows["next"][i, sort]
+            leaves = all_leaves[j]
+            fixed_faces, full_faces, fixed_wood, full_wood, spurs = (
+                getattr(totals, name)[j].sum() for name in _OF_WOOD
+            )
+            if sort in (FORK, SPUR):
+                one = children_sums(exact, i, int(sort))
+            if sort == FORK:
+                for whole, its in ((own, power[j]), (on_limbs, borne[j])):
+                    stem = its * one.number
+                    stem[:, :, _WOOD] = its[:, :, _WOOD] * one.wood * (above / stretch)[:, None]
+                    whole += stem
+            elif sort == SPUR:
+                own[:, 0, _LEAVES] += one.full * leaves
+                own[:, 0, _FACES] += one.number * fixed_faces + one.full * full_faces
+                own[:, 0, _SPURS] += one.wood * fixed_wood + one.full_wood * full_wood + one.full * spurs
+            else:
+                weight = rows["count_by_length"][j]
+                for b, base in enumerate(_BASES):
+                    number, bearing, longer, wood, full, more = _limbs(exact, int(i), int(sort), base)
+                    still, grows = (1 - weight) * bearing, weight * longer
+                    own[b, 0, _FACES] += number * fixed_faces
+                    own[b, 1, _WOOD] += wood * fixed_wood / stretch[b]
+                    bears = np.zeros_like(own[b])
+                    bears[0, _LEAVES], bears[1, _LEAVES] = still * leaves, grows * leaves
+                    bears[:2, _FACES] = still * full_faces, grows * full_faces
+                    bears[1:, _WOOD] = np.array([(1 - weight) * full, weight * more]) * full_wood / stretch[b]
+                    bears[:2, _SPURS] = still * spurs, grows * spurs
+                    own[b] += bears
+                    if sort == LATERAL:
+                        on_limbs[b] += bears
+    return ShapedTotals(shaped, power, borne)
+
+
+def _limbs(rows: Table, i: int, sort: int, base: float) -> tuple[float, ...]:
+    """Expected sums over the laterals or dead branches of a row whose crown has a base.
+
+    Their number; the sums of what new ones lack of their numbers, of that × vigor; of length × radius over the
+    parent's; and of that × the first and the second.
+    """
+    at, row = np.array([i]), rows[i]
+    number = float(row["count"][sort, 0])
+    bare = float(bare_part(rows, at, base)[0])
+    among = lateral_fractions(rows, at, base)[0] if sort == LATERAL else row["fraction"][sort]
+    weight, fading = 1.0, 1.0
+    if row["growing"][sort, NOW] > 0:
+        ends, plain = ((bare,), ()) if sort == LATERAL else ((0.0, bare), (0.0, 0.0))
+        number *= living(row, sort, *ends) / max(living(row, sort, *plain), 1e-12)
+        t, fraction, weight, fading = spread_children(row, sort, bare * (sort == LATERAL), bare * (sort == DEAD), among)
+    elif sort == DEAD:
+        (start, end), last = row["start"][sort], float(dead_end(rows, at, base)[0])
+        number *= (last - start) / (end - start) if end > start else 1.0
+        t, fraction = start + (last - start) * EVEN, among[0] + (among[1] - among[0]) * EVEN
+    else:
+        mean, variation = row["start"][sort]
+        starts = mean + variation * _ABSCISSAS
+        number *= float(_MEANS @ ((1 - np.maximum(starts, bare)) / np.maximum(1 - starts, 1e-9)))
+        start = max(mean, bare)
+        t, fraction = start + (1 - start) * EVEN, among[0] + (among[1] - among[0]) * EVEN
+    if sort == LATERAL:
+        number *= float(limb_count_factors(rows, at, base)[0])
+    vigor, _, size = side_branches(rows, i, sort, t, fraction, fading)
+    # Numbers of a branch on which nothing follows the length: all but those of new branches.
+    plain = rows[[row["next"][sort]]].copy()
+    plain["count_by_length"] = 0
+    bears = fullness_of(plain, np.zeros(t.shape, np.int64), vigor)
+    means = (float((weight * one).mean()) for one in (bears, bears * vigor, size, size * bears, size * bears * vigor))
+    return number, *(number * mean for mean in means)
+
+
+_SEEN = (seasons.AREA, seasons.FRESH, seasons.AUTUMN, seasons.DRY)
+
+
+@dataclass(frozen=True, eq=False)
+class DayTotals:
+    """Totals of sub-plants by row (r) and kind of leaf (k) in summer, and what a day leaves of each."""
+
+    years: Table  # (r, k) array of the column ``year``: of the species of each row
+    table: Integers  # (r, k): index into ``tables``
+    tables: Floats  # (t, 6, d): see `growth.seasons.leaf_table`
+    origin: Floats  # (t,): days on which these begin
+    area: Floats  # (r, 3, k): expected one-sided area of leaves at `averages.NODES`, m² at plant scale 1
+    color: Floats  # (r, 3, k, 3): area times mean color in summer at the same places
+    #: count and faces, (r, k): expected numbers of leaves and of their faces.
+    count: Floats
+    faces: Floats
+    #: (r,): mean width of what bears the leaves of sub-plants, meters at plant scale 1; without leaves that of the
+    #: branch.
+    twig: Floats
+
+    @property
+    def kinds(self) -> Integers:
+        """Kinds of leaves that any plants bear."""
+        return np.flatnonzero(self.count.any(axis=0))
+
+    def left(self, branches: Branches, kind: int | Integers, *columns: int) -> list[Floats]:
+        """What is left of leaves of a kind, or of kinds (n,), on the days of branches (n): some columns (n,)."""
+        which = self.table[branches.row, kind]
+        return seasons.expected(self.tables, self.origin, which, branches.year[:, 0], columns)
+
+    def _summed(self, subplants: Branches, each: Floats, column: int) -> Floats:
+        """Sum (n,) over kinds of leaves of what they have in summer (n, k) and the day leaves."""
+        return sum(each[:, kind] * self.left(subplants, kind, column)[0] for kind in self.kinds)
+
+    def leaf_areas(self, subplants: Branches, shaped: Floats | float = 1.0) -> Floats:
+        """Area (n,) of leaves at plant scale 1, without the fullness of sub-plants.
+
+        ``shaped`` (n, k) are factors by kind of leaf, because of crown shapes.
+        """
+        area = np.einsum("nj,njk->nk", quadratic(subplants.outward), self.area[subplants.row])
+        return self._summed(subplants, area * shaped, seasons.AREA)
+
+    def leaf_counts(self, subplants: Branches) -> Floats:
+        """Number (n,) of leaves, likewise."""
+        return self._summed(subplants, self.count[subplants.row], seasons.PRESENT)
+
+    def leaf_faces(self, subplants: Branches, shaped: Floats | float = 1.0) -> Floats:
+        """Number (n,) of faces of leaves, likewise."""
+        return self._summed(subplants, self.faces[subplants.row] * shaped, seasons.PRESENT)
+
+    def leaf_colors(self, subplants: Branches) -> Floats:
+        """Mean colors (n, 3) of leaves, weighted by area; black where there are none."""
+        weights = quadratic(subplants.outward)
+        area = np.einsum("nj,njk->nk", weights, self.area[subplants.row])
+        summer = np.einsum("nj,njkc->nkc", weights, self.color[subplants.row])
+        total, out = np.zeros(len(subplants)), np.zeros((len(subplants), 3))
+        for kind in self.kinds:
+            year, left = self.years[subplants.row, kind], self.left(subplants, kind, *_SEEN)
+            out += _mixed(summer[:, kind], area[:, kind], left, year, subplants.year[:, 1])
+            total += area[:, kind] * left[0]
+        return out / np.maximum(total, 1e-300)[:, None]
+
+    def own_colors(self, branches: Branches, kind: Integers, summer: Floats, owner: Integers | None = None) -> Floats:
+        """Mean colors (n, 3) of leaves of one kind (n,), of which those in summer are known (n, 3).
+
+        ``owner`` (n,) are their branches, if not one for each.
+        """
+        out = summer.copy()
+        for one in self.kinds:
+            left, none = self.left(branches, int(one), *_SEEN), np.zeros((len(branches), 3))
+            added = _mixed(none, np.ones(len(branches)), left, self.years[branches.row, one], branches.year[:, 1])
+            every = np.where(left[0] > 0, left[0], 1.0)
+            factor = np.where(left[0] > 0, (left[0] - left[1] - left[2] - left[3]) / every, 1.0)
+            added = added / every[:, None]
+            if owner is not None and (kind == one).all():
+                return gathered(factor, owner)[:, None] * summer + gathered(added, owner)
+            some = np.flatnonzero(kind == one)
+            which = some if owner is None else owner[some]
+            out[some] = factor[which, None] * summer[some] + added[which]
+        return out
+
+    def widths(self, subplants: Branches, leaf: Floats, bare: Floats) -> Floats:
+        """Widths (n,) between those of leaves in summer (n,) and of what bears them (n,), by number and by growth."""
+        count = self.count[subplants.row]
+        every, left = count.sum(axis=1), self._summed(subplants, count, seasons.PRESENT)
+        size = self._summed(subplants, count, seasons.SIZE) / np.maximum(left, 1e-300)
+        share = left / np.maximum(every, 1e-300)
+        return np.where(every > 0, bare + share * (leaf * size - bare), leaf)
+
+    def share_range(self, rows: Table, species: int) -> tuple[float, float]:
+        """Least and greatest `leaf_share` of plants of a species on the day of rows (r,)."""
+        trunk = np.flatnonzero(rows["species"] == species)[0]
+        days = _days_of_plants(rows[trunk])
+        area = self.area[trunk].mean(axis=0)
+        every = (np.full(len(days), table) for table in self.table[trunk].tolist())
+        left = [seasons.expected(self.tables, self.origin, which, days, [seasons.AREA])[0] for which in every]
+        share = area @ np.array(left) / area.sum() if area.sum() > 0 else np.ones(1)
+        return float(share.min()), float(share.max())
+
+    def leaf_share(self, subplants: Branches) -> Floats:
+        """Area (n,) of leaves over that in summer, 1 where there are never any."""
+        area = self.area[subplants.row].mean(axis=1)
+        all_year = area.sum(axis=1)
+        left = self._summed(subplants, area, seasons.AREA)
+        return np.where(all_year > 0, left / np.where(all_year > 0, all_year, 1.0), 1.0)
+
+
+def _mixed(summer: Floats, area: Floats, left: list[Floats], year: Table, hue: Floats) -> Floats:
+    """Area times color (n, 3) of leaves on a day, from those in summer (n, 3) of areas (n,), by columns of `_SEEN`."""
+    every, *others = left
+    out = (every - sum(others))[:, None] * summer
+    for part, color in zip(others, (year["fresh"], seasons.mean_autumn_colors(year, hue), year["dry"]), strict=True):
+        out += (area * part)[:, None] * color
+    return out
+
+
+def totals_of_day(
+    rows: Table, species: Sequence[Species], season: seasons.Season, totals: Averages, leaf: RowLeaves
+) -> tuple[Table, DayTotals] | None:
+    """Rows on a day, and totals of their sub-plants; None where no plant is other than in summer.
+
+    Parameters
+    ----------
+    rows : (r,) parameter table
+    species : sequence of Species
+    season : seasons.Season
+    totals : Averages
+        Of the same rows.
+    leaf : RowLeaves
+        Likewise.
+    """
+    if all(one.year is None for one in species):
+        return None
+    rows = seasons.seasonal_rows(rows, species, season)
+    own = [one.year and one.year.at_latitude(abs(season.latitude)) for one in species]
+    kinds = [[None if year is None else year.of_kind(k) for k in range(KINDS)] for year in own]
+    every = list(dict.fromkeys(leaf for some in kinds for leaf in some))
+    tables = np.stack([seasons.leaf_table(one) for one in every])
+    origin = np.array([0.0 if one is None else one.origin for one in every])
+    of_species = np.array([[every.index(one) for one in some] for some in kinds])
+    years = np.zeros((len(species), KINDS), rows.dtype["year"])
+    for number in range(len(species)):
+        for kind in range(KINDS):
+            bearing = (rows["species"] == number) & (rows["leaf_kind"] == kind)
+            if bearing.any():
+                years[number, kind] = rows["year"][bearing][0]
+    number = rows["species"]
+    count = totals.leaves.sum(axis=1)
+    twig = np.where(count > 0, totals.leaves @ totals.radius / np.maximum(count, 1e-300), totals.radius)
+    made = DayTotals(years[number], of_species[number], tables, origin, *_by_kind(rows, totals, leaf), 2.0 * twig)
+    return (rows, made) if _differs(rows, made, of_species) else None
+
+
+def _by_kind(rows: Table, totals: Averages, leaf: RowLeaves) -> tuple[Floats, ...]:
+    """``area``, ``color``, ``count`` and ``faces`` of `DayTotals`."""
+    kinds = np.arange(KINDS) == rows["leaf_kind"][:, None]  # (r, k), which kind each contributing row bears
+    area = totals.leaf_area @ kinds
+    color = np.zeros((*area.shape, 3))
+    used = [kind for kind in range(KINDS) if area[..., kind].any()]
+    for kind in used[:-1]:
+        some = rows.copy()
+        some["leaves"] *= kinds[:, kind, None]
+        color[:, :, kind] = average(some, leaf).leaf_color
+    if used:  # the last has what is left
+        color[:, :, used[-1]] = np.maximum(totals.leaf_color - color.sum(axis=2), 0.0)
+    return area, color, totals.leaves @ kinds, (totals.leaves * leaf.polygons) @ kinds
+
+
+def _days_of_plants(trunk: np.void) -> Floats:
+    """Days (n,) that it may be for plants of a species, by the row of its trunk."""
+    return seasons.plant_days(trunk["day"], max(trunk["spring"], trunk["autumn"]))
+
+
+def _differs(rows: Table, made: DayTotals, of_species: Integers) -> bool:
+    """Whether any plant may have other leaves than in summer."""
+    summer = np.array([[1.0], [1.0], [1.0], [0.0], [0.0], [0.0]])
+    trunk = np.unique(rows["species"], return_index=True)[1]
+    for row, which in zip(rows[trunk], of_species, strict=True):
+        days = _days_of_plants(row)
+        for table in which.tolist():
+            left = seasons.expected(made.tables, made.origin, np.full(len(days), table), days)
+            if np.abs(np.array(left) - summer).max() > 1e-9:
+                return True
+    return False

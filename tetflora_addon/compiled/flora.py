@@ -6,12 +6,10 @@ Areas, counts and colors are expectations in closed form. Orientation and the pl
 sub-plant are kept as a few hundred sample points, drawn by following random paths from the branch outwards.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Container, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Self
 
 import numpy as np
 
@@ -27,15 +25,24 @@ from ..leaves.models import LeafModel
 from ..species.ages import with_habit
 from ..species.quality import with_quality
 from ..species.species import LEAF_KINDS, Species
-from .averages import Averages, RowLeaves, average, quadratic, row_leaves
+from .averages import (
+    Averages,
+    DayTotals,
+    RowLeaves,
+    ShapedTotals,
+    average,
+    quadratic,
+    row_leaves,
+    shaped_totals,
+    totals_of_day,
+)
 from .bounds import leaf_reaches, limb_reaches, sampled_bounds, unit_bounds, widest_radii
 from .clumping import Clumping, fit_clumping
-from .factors import DayTotals, ShapedTotals, shaped_totals, totals_of_day
 from .orientation import Orientation, orientation_of
 from .samples import Samples, draw_samples
 
 
-def _in_summer(compute: Callable[[Flora], Any]) -> Any:
+def _in_summer(compute: "Callable[[Flora], Any]") -> Any:
     """A property that is found out once when first asked for, of the flora in summer without wind.
 
     Only proxies need what takes rays or samples to know, and few scenes have crown shapes.
@@ -83,25 +90,25 @@ class Flora:
     averages: Averages  # all expected totals by the row that contributes them
     area_nodes: Floats  # (r, 3): expected one-sided area of leaves at `averages.NODES`, m² at plant scale 1
     color_nodes: Floats  # (r, 3, 3): area times mean color at the same places
-    calm: Flora | None = None  # the same without the wind that this one is in
-    summer: Flora | None = None  # the same in summer, where this one is on another day of the year
+    calm: Self | None = None  # the same without the wind that this one is in
+    summer: Self | None = None  # the same in summer, where this one is on another day of the year
     day: DayTotals | None = None  # what the day leaves of leaves; with ``summer``
 
     @property
-    def at_rest(self) -> Flora:
+    def at_rest(self) -> Self:
         """The flora without wind: what is inside of sub-plants is known of plants that do not move."""
         return self.calm or self
 
     @property
-    def in_leaf(self) -> Flora:
+    def in_leaf(self) -> Self:
         """The flora in summer without wind: what takes rays or samples to know is known of it."""
         return self.at_rest.summer or self.at_rest
 
-    def in_year(self, season: Season) -> Flora:
+    def in_year(self, season: Season) -> Self:
         """The flora on a day of the year, without wind; itself in summer where nothing differs on that day."""
         return _on_day(self.in_leaf, replace(season, snow=0.0))
 
-    def in_wind(self, wind: Wind) -> Flora:
+    def in_wind(self, wind: Wind) -> Self:
         """The flora in a wind; bounds hold at all times. Without speed plants may still move as a whole."""
         if wind.speed == 0 and not wind.moving:
             return self.at_rest

@@ -10,10 +10,9 @@ fitted for skies all around the branch, but half of them are where an upright pl
 cannot follow is missed where no branch stands.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Self
 
 import numpy as np
 
@@ -133,12 +132,6 @@ def _turned(six: Floats, frame: Floats) -> Floats:
     return frame @ full @ frame.transpose(0, 2, 1)
 
 
-def _six(moments: Floats, frame: Floats) -> Floats:
-    """Rᵀ M R as six numbers (n, 6) of symmetric M (n, 3, 3)."""
-    local = frame.transpose(0, 2, 1) @ moments @ frame
-    return np.stack([local[:, i, j] for i, j in _PAIRS], axis=1)
-
-
 def _frames_along(axis: Floats) -> Floats:
     """Frames (n, 3, 3) whose third column is an axis (n, 3), turned about it as may be."""
     x = perpendicular(axis)
@@ -168,9 +161,14 @@ def orientation_of(
     leaf_area, wood_area = leaf.sum(axis=1), wood.sum(axis=1)
     skies = _skies_met(rows, length)
     for i in range(len(rows) - 1, -1, -1):
-        branches = _sample_branches(
-            i, float(length[i]), _skies_around(_BRANCHES, bool(rows["order"][i] == 0), skies[i])
-        )
+        # Directions (n, 3) of the sky, every other one of those that are met, the rest all around.
+        met = skies[i]
+        cos = 1 - 2 * (np.arange(_BRANCHES) + 0.5) / _BRANCHES
+        if bool(rows["order"][i] == 0):  # most plants stand, and few lie
+            cos = 1 - 2 * ((1 - cos) / 2) ** 3
+        sky = spiral(cos, np.arange(_BRANCHES), GOLDEN_ANGLE)
+        sky[1::2] = met[thinned(len(met), len(sky[1::2]))]
+        branches = _sample_branches(i, float(length[i]), sky)
         lines = axes(rows, branches)
         children, owner, stands = _some_children(rows, branches, lines)
         row, scale = children.row, branches.scale[0]
@@ -190,7 +188,13 @@ def orientation_of(
         weight = stands * children.length * children.radius * wood_area[row]
         bark = _Sums.of(len(branches), owner, _evaluated(out.wood, row, children.frame, children.outward), weight)
         if not rows["phantom"][i]:
-            bark = _own_wood(rows, branches, lines).mixed(bark, wood[i, i] / wood_area[i])
+            # A place on each branch.
+            t = uniform(branches.key, _ALONG)
+            _, frame = lines.at(np.arange(len(branches)), t)
+            axis = frame[:, :, 2]
+            moment = (np.eye(3) - axis[:, :, None] * axis[:, None, :]) / 2
+            radius = radius_at(rows, branches, t)
+            bark = _Sums(moment * radius[:, None, None], radius).mixed(bark, wood[i, i] / wood_area[i])
         out.wood[i, 0] = bark.fitted(branches, basis)
     return out
 
@@ -203,13 +207,13 @@ class _Sums:
     weight: Floats
 
     @classmethod
-    def of(cls, n: int, owner: Integers, moment: Floats, weight: Floats) -> _Sums:
+    def of(cls, n: int, owner: Integers, moment: Floats, weight: Floats) -> Self:
         """Sums over things (m,) on branches (m,) of n, with moments (m, 3, 3)."""
         values = (moment * weight[:, None, None]).reshape(-1, 9).T
         sums = np.stack([np.bincount(owner, one, n) for one in values], axis=1)
         return cls(sums.reshape(n, 3, 3), np.bincount(owner, weight, n))
 
-    def mixed(self, other: _Sums, fraction: float) -> _Sums:
+    def mixed(self, other: Self, fraction: float) -> Self:
         """Both together; this one has a known fraction of all."""
         if other.weight.sum() <= 0:
             return self
@@ -222,7 +226,9 @@ class _Sums:
         normal = _inner(basis, basis * (self.weight / whole)[:, None])
         # Where branches can only stand in some ways, others are left to the least coefficients.
         normal += 1e-9 * np.trace(normal) / len(normal) * np.eye(len(normal))
-        return np.linalg.solve(normal, _inner(basis, _six(self.moment / whole, branches.frame)))
+        # Rᵀ M R as six numbers (n, 6) of symmetric M (n, 3, 3).
+        local = branches.frame.transpose(0, 2, 1) @ (self.moment / whole) @ branches.frame
+        return np.linalg.solve(normal, _inner(basis, np.stack([local[:, i, j] for i, j in _PAIRS], axis=1)))
 
 
 def _inner(a: Floats, b: Floats) -> Floats:
@@ -251,16 +257,6 @@ def _skies_met(rows: Table, length: Floats) -> list[Floats]:
             for row in np.unique(children.row):
                 met[row].append(children.frame[children.row == row, 2])
     return out
-
-
-def _skies_around(n: int, upright: bool, met: Floats) -> Floats:
-    """Directions (n, 3) of the sky, every other one of those that are met, the rest all around."""
-    cos = 1 - 2 * (np.arange(n) + 0.5) / n
-    if upright:  # most plants stand, and few lie
-        cos = 1 - 2 * ((1 - cos) / 2) ** 3
-    sky = spiral(cos, np.arange(n), GOLDEN_ANGLE)
-    sky[1::2] = met[thinned(len(met), len(sky[1::2]))]
-    return sky
 
 
 def _sample_branches(row: int, length: float, sky: Floats) -> Branches:
@@ -332,16 +328,6 @@ def _own_leaves(rows: Table, branches: Branches, lines: Axes, turn: Floats, plac
     out.moment[bearers] = left @ right.transpose(0, 2, 1)
     out.weight[bearers] = weight.reshape(-1, leaves).sum(axis=1)
     return out
-
-
-def _own_wood(rows: Table, branches: Branches, lines: Axes) -> _Sums:
-    """A place on each branch."""
-    t = uniform(branches.key, _ALONG)
-    _, frame = lines.at(np.arange(len(branches)), t)
-    axis = frame[:, :, 2]
-    moment = (np.eye(3) - axis[:, :, None] * axis[:, None, :]) / 2
-    radius = radius_at(rows, branches, t)
-    return _Sums(moment * radius[:, None, None], radius)
 
 
 def _model_moments(rows: Table, forms: Sequence[Sequence[Sequence[LeafModel]]]) -> Floats:

@@ -10,10 +10,9 @@ Kahn and Harris, "Estimation of particle transmission by random sampling", 1951)
 Those of trunks know which limbs they are on, so that they can be moved as the crown shape of a plant moves its limbs.
 """
 
-from __future__ import annotations
-
 from collections.abc import Container, Sequence
 from dataclasses import dataclass, replace
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -57,8 +56,8 @@ class Points:
     outward: Floats32  # (k,): place between the inside and the outside of the crown
     light: Floats32  # (k,): how far a leaf turns to the sky
     young: Floats32  # (k,): how young it is, see `growth.foliage.youth`
-    limbs: Limbs  # of k
-    shares: Shares  # of r
+    limbs: "Limbs"  # of k
+    shares: "Shares"  # of r
 
     def runs(self, subplants: Branches) -> tuple[Integers, Integers]:
         """First sample and number of samples (n,), (n,) that stand for sub-plants as they are turned to the sky."""
@@ -138,10 +137,10 @@ class _Points(Arrays):
     light: Floats
     young: Floats
     area: Floats
-    limbs: Limbs | None = None
+    limbs: "Limbs | None" = None
 
     @classmethod
-    def on(cls, rows: Table, one: _Arrived, branch: Integers, position: NDArray, *rest: NDArray) -> _Points:
+    def on(cls, rows: Table, one: "_Arrived", branch: Integers, position: NDArray, *rest: NDArray) -> Self:
         """Points on branches, given by number."""
         row = one.branches.row[branch]
         short = rows["order"][row[:1]] == SPUR_ORDER
@@ -192,7 +191,12 @@ class _Walk:
             for sort in (LATERAL, FORK, SPUR, DEAD):
                 child = int(rows["next"][row, sort])
                 if child >= 0 and rows["count"][row, sort, 0] > 0:
-                    arrived[child - first].append(_one_child_each(rows, one, lines, sort))
+                    # A child of one sort of each branch that has any.
+                    counts = _at_least_some(branch_counts(rows, one.branches, sort))
+                    alive = np.flatnonzero(counts)
+                    index = (evenly(one.branches.key, _CHILD + sort) * counts).astype(np.int64)[alive]
+                    children = chosen_children(rows, one.branches, lines, alive, index, counts, sort)
+                    arrived[child - first].append(_Arrived(children, (one.weight * counts)[alive], one.line[:, alive]))
             for number, child in enumerate(range(*rows["drawn_rows"][row])):
                 places = self._number(child)
                 owner = thinned(len(one.weight), places)
@@ -322,15 +326,6 @@ def _leaf_points(rows: Table, one: _Arrived, lines: Axes) -> _Points:
     return _Points.on(rows, one, picked, leaves.position, leaves.frame, outward, light, young, area)
 
 
-def _one_child_each(rows: Table, one: _Arrived, lines: Axes, sort: int) -> _Arrived:
-    """A child of one sort of each branch that has any."""
-    counts = _at_least_some(branch_counts(rows, one.branches, sort))
-    alive = np.flatnonzero(counts)
-    index = (evenly(one.branches.key, _CHILD + sort) * counts).astype(np.int64)[alive]
-    children = chosen_children(rows, one.branches, lines, alive, index, counts, sort)
-    return _Arrived(children, (one.weight * counts)[alive], one.line[:, alive])
-
-
 def _joined(found: list[tuple[int, _Points, Integers, Integers]], rows: int) -> Points:
     """Samples of one row after the other: row, points, and first sample and number of each class."""
     first, number = np.zeros((2, rows, _CLASSES), np.int64)
@@ -371,7 +366,7 @@ class Shares:
     follows: Floats  # (r,): mean over those on limbs
 
     @classmethod
-    def of(cls, limbs: Limbs, row: Integers, rows: int) -> Shares:
+    def of(cls, limbs: Limbs, row: Integers, rows: int) -> Self:
         """Of samples (k,) of rows (k,), of which there are so many."""
         on = limbs.kind >= LIMB
         kinds = np.bincount(row.astype(np.int64) * 4 + limbs.kind, minlength=4 * rows).reshape(rows, 4)

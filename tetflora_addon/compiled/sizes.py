@@ -7,10 +7,9 @@ reaches beyond them is known from a few whole limbs of their kind. How wide and 
 average is for distances to plant at, and for estimates.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
+from typing import Self
 from weakref import WeakKeyDictionary
 
 import numpy as np
@@ -57,7 +56,7 @@ _REACH = 0.25  # of a line's length is how far its nearer end is to one side of 
 _PARTS = 4096  # leaves, and branches, of a crown that stand for all: few of a tree's are at the height of eyes
 _FINER = 8  # times as many samples, of which these are
 
-_known: dict[Species, Crown] = {}
+_known: "dict[Species, Crown]" = {}
 
 
 @dataclass(frozen=True)
@@ -79,7 +78,7 @@ class CrownParts(Arrays):
     buds: Floats  # (n,): on a branch
     form: Integers = column(dtype=np.int64)  # (n,): which of `Crown.forms` a leaf has; -1 of branches
 
-    def with_leaves(self, fraction: float) -> CrownParts:
+    def with_leaves(self, fraction: float) -> Self:
         """The same with a fraction of the leaves."""
         return replace(self, number=np.where(self.form < 0, 1.0, fraction) * self.number)
 
@@ -234,7 +233,7 @@ _BATCH = 2_000
 _BISECTIONS = 11
 #: Factors that would change by less are found.
 _CLOSE = 0.015
-_reaches: WeakKeyDictionary[Flora, dict[int, TwigReach]] = WeakKeyDictionary()
+_reaches: "WeakKeyDictionary[Flora, dict[int, TwigReach]]" = WeakKeyDictionary()
 
 
 def measured(flora: Flora, seeds: Seeds) -> tuple[Floats, Floats]:
@@ -310,14 +309,14 @@ def _by_kind(flora: Flora, seeds: Seeds, work: Callable[[Integers], None]) -> No
     each_on_all_cores(work, [some[i : i + _BATCH] for some in kinds for i in range(0, len(some), _BATCH)])
 
 
-def _beyond(flora: Flora, species: int) -> TwigReach:
+def _beyond(flora: Flora, species: int) -> "TwigReach":
     known = _reaches.setdefault(flora, {})
     if species not in known:
         known[species] = beyond_limbs(flora.rows, int(flora.first_row[species]), species)
     return known[species]
 
 
-def _sizes(flora: Flora, seeds: Seeds) -> tuple[Floats, Floats, OuterLimbs | None]:
+def _sizes(flora: Flora, seeds: Seeds) -> "tuple[Floats, Floats, OuterLimbs | None]":
     """Heights and crown widths (n,), (n,) of plants of one species, and what reaches farthest, if they have limbs."""
     plants, beyond = trunks(flora.rows, seeds), _beyond(flora, int(seeds.species[0]))
     if beyond.whole[0] > 0:
@@ -331,7 +330,7 @@ def _sizes(flora: Flora, seeds: Seeds) -> tuple[Floats, Floats, OuterLimbs | Non
     return *found.sizes(), found
 
 
-def _solved(found: OuterLimbs, wanted: Floats, least: Floats, most: Floats) -> Floats:
+def _solved(found: "OuterLimbs", wanted: Floats, least: Floats, most: Floats) -> Floats:
     """Factors (n,) on limbs, between limits (n,), by which crown widths over heights become what is wanted (n,)."""
     low, high = least, np.maximum(most, least)
     for _ in range(_BISECTIONS):

@@ -1,23 +1,27 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""PlacedClusters of instances of assets as the frontier draws them: originals, meshes of clusters, kites, or facets.
+"""Instances of assets: what they cost a renderer, and as what the frontier draws them.
 
-Decisions are made for clusters of up to `asset.MESH_FACES` faces. One is real with the probability that its leaves are,
-by a hash of its own, so that nothing pops. An instance of which most is real is drawn as the original: that costs
-nothing more, and keeps all that the artist has made. What is drawn as it is covers the image by its leaves, as far as
-these are more than a few pixels, or else by facets, as many as are needed for that.
+Cycles keeps an asset once, and a few bytes for each instance: rays find their way through ten thousand instances nearly
+as fast as through ten. Where all assets fit into memory, plain instances are the cheapest. EEVEE and the viewport draw
+every triangle of every instance. ``python -m benchmarks assets`` measures both.
+
+What is refined becomes originals, meshes of clusters, kites, or facets. Decisions are made for clusters of up to
+`asset.MESH_FACES` faces. One is real with the probability that its leaves are, by a hash of its own, so that nothing
+pops. An instance of which most is real is drawn as the original: that costs nothing more, and keeps all that the artist
+has made. What is drawn as it is covers the image by its leaves, as far as these are more than a few pixels, or else by
+facets, as many as are needed for that.
 """
-
-from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import chunks, column
+from ..arrays import Floats, Integers, Mask, chunks, column
 from ..camera.camera import Camera
 from ..growth.hashing import Draw, uniform
 from ..proxies.asset_facets import facet_totals, facets_of_assets
@@ -45,7 +49,7 @@ _KITES_BATCH = 200_000
 class OriginalPolicy:
     """When an instance is drawn as the original."""
 
-    always: NDArray[np.bool_]  # (a,): assets of which every instance is
+    always: Mask  # (a,): assets of which every instance is
     fraction: float = 0.6  # fraction of its faces that are to be real; more than 1 for never
     #: Meshes of clusters cost the renderer as much as one of them, in however many places. Else each place counts.
     shared: bool = False
@@ -59,13 +63,13 @@ class AssetPlan:
     """Instances of assets that are drawn as they are."""
 
     #: (k,): instances that are the originals.
-    originals: NDArray[np.int64] = field(default_factory=lambda: np.zeros(0, np.int64))
+    originals: Integers = field(default_factory=lambda: np.zeros(0, np.int64))
     #: meshes and kites, of m, of k: PlacedClusters that are meshes of their own faces, and of kites for their leaves.
     meshes: AssetParts = field(default_factory=AssetParts.empty)
     kites: AssetParts = field(default_factory=AssetParts.empty)
 
     @classmethod
-    def of(cls, placed: PlacedAssets, originals: OriginalPolicy, shown: list[Shown]) -> AssetPlan:
+    def of(cls, placed: PlacedAssets, originals: OriginalPolicy, shown: list[Shown]) -> Self:
         """What a drawing has shown."""
         every = {
             label: AssetParts.concatenate([AssetParts.empty(), *(rows for what, rows in shown if what == label)])
@@ -81,10 +85,10 @@ class AssetPlan:
 class ClusterRows(AssetParts):
     """PlacedClusters of instances (n), as the frontier has them."""
 
-    shown: NDArray[np.bool_] = column(dtype=bool)  # (n,): drawn as they are: only what they cover is to be found
+    shown: Mask = column(dtype=bool)  # (n,): drawn as they are: only what they cover is to be found
 
     @classmethod
-    def of(cls, parts: AssetParts, shown: NDArray[np.bool_]) -> ClusterRows:
+    def of(cls, parts: AssetParts, shown: Mask) -> Self:
         """Parts (n,), of which some are shown already."""
         return cls(*vars(parts).values(), shown)
 
@@ -111,19 +115,15 @@ class PlacedClusters(FrontierKind):
         whole = self.placed.wholes()
         return ClusterRows.of(whole, self.originals.always[self.placed.instances.asset])
 
-    def spheres(self, rows: ClusterRows) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """As of `FrontierKind`."""
-        return rows.center, rows.reach
-
-    def optical(self, rows: ClusterRows) -> NDArray[np.float64]:
+    def optical(self, rows: ClusterRows) -> Floats:
         """As of `FrontierKind`; of what is drawn as it is, for facets that only tell what is covered."""
         return np.where(rows.shown, COVERING**-2.0, 1.0) * rows.totals.optical_area
 
-    def one_leaf(self, rows: ClusterRows) -> NDArray[np.float64]:
+    def one_leaf(self, rows: ClusterRows) -> Floats:
         """As of `FrontierKind`."""
         return self.placed.assets.clusters.one_leaf[rows.cluster] * self.placed.scale[rows.instance] ** 2
 
-    def enough(self, rows: ClusterRows) -> NDArray[np.float64]:
+    def enough(self, rows: ClusterRows) -> Floats:
         """As of `FrontierKind`; nothing of what is drawn as it is."""
         clusters = self.placed.assets.clusters
         side = (clusters.high - clusters.low)[rows.cluster]
@@ -131,17 +131,17 @@ class PlacedClusters(FrontierKind):
         silhouette = silhouette * self.placed.scale[rows.instance] ** 2
         return np.where(rows.shown, 0.0, opaque_fractions(silhouette, rows.totals.optical_area))
 
-    def can_open(self, rows: ClusterRows) -> NDArray[np.bool_]:
+    def can_open(self, rows: ClusterRows) -> Mask:
         """As of `FrontierKind`; of what is drawn as it is, only what facets tell about."""
         told = rows.shown & (self._mesh_of[rows.cluster] >= 0) & self._wide(rows)
         return (self.placed.assets.clusters.children[rows.cluster] > 0) & ~told
 
-    def opened(self, rows: ClusterRows) -> tuple[ClusterRows, NDArray[np.int64]]:
+    def opened(self, rows: ClusterRows) -> tuple[ClusterRows, Integers]:
         """As of `FrontierKind`."""
         parts, owner = self.placed.children(rows)
         return ClusterRows.of(parts, rows.shown[owner]), owner
 
-    def to_be_opened(self, rows: ClusterRows) -> NDArray[np.bool_]:
+    def to_be_opened(self, rows: ClusterRows) -> Mask:
         """Those above clusters with meshes of their own, of which some may be real."""
         return ~rows.shown & (self._mesh_of[rows.cluster] < 0) & (self.explicit(rows)[0] > 0.0)
 
@@ -150,14 +150,14 @@ class PlacedClusters(FrontierKind):
         return rows.take(np.argsort(self.placed.keys(rows), kind="stable"))
 
     @cached_property
-    def _mesh_of(self) -> NDArray[np.int64]:
+    def _mesh_of(self) -> Integers:
         return self.placed.assets.mesh_of
 
-    def _wide(self, rows: ClusterRows) -> NDArray[np.bool_]:
+    def _wide(self, rows: ClusterRows) -> Mask:
         """PlacedClusters (n,) of which leaves are wide enough for kites of theirs to be told apart."""
         return rows.totals.width > KITES * self.camera.extent_around(rows.center)
 
-    def explicit(self, rows: AssetParts) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def explicit(self, rows: AssetParts) -> tuple[Floats, Floats]:
         """Fractions (n,) of clusters that are meshes, if only of kites, and (n,) that are their own faces."""
         pixels = rows.totals.width / np.maximum(self.camera.extent_around(rows.center), 1e-300)
         if not self.originals.kites:
@@ -182,7 +182,7 @@ class PlacedClusters(FrontierKind):
                 shown.append((what, rows.parts.take(np.flatnonzero(chosen))))
         return replace(rows, shown=rows.shown | whole | mesh | kites)
 
-    def draw(self, canvas: Canvas, slab: Waiting, side: NDArray[np.float64], _shown: list[Shown]) -> None:
+    def draw(self, canvas: Canvas, slab: Waiting, side: Floats, _shown: list[Shown]) -> None:
         """As of `FrontierKind`."""
         rows = slab.parts
         facets = np.flatnonzero(~rows.shown)
@@ -202,14 +202,14 @@ class PlacedClusters(FrontierKind):
         canvas.add_shown(triangle_corners(made), float(faces))
 
     def unseen(
-        self, rows: ClusterRows, side: NDArray[np.float64], kept: NDArray[np.float64], _shown: list[Shown]
+        self, rows: ClusterRows, side: Floats, kept: Floats, _shown: list[Shown]
     ) -> Iterator[tuple[Whose, Facets]]:
         """As of `FrontierKind`."""
         some = np.flatnonzero(~rows.shown)
         yield from self._facets(rows.take(some), side[some], 1.0 - kept[some])
 
     def _facets(
-        self, rows: ClusterRows, side: NDArray[np.float64], left_out: NDArray[np.float64] | None = None
+        self, rows: ClusterRows, side: Floats, left_out: Floats | None = None
     ) -> Iterator[tuple[Whose, Facets]]:
         looks = self.looks[rows.instance]
         leaf = np.maximum(side, np.sqrt(self.one_leaf(rows)))
@@ -236,3 +236,61 @@ def explicit_plan(result: Refinement, originals: OriginalPolicy) -> AssetPlan:
     faces = np.bincount(own.instance, own.totals.polygons, len(placed))
     whole = originals.always[asset] | (faces >= originals.fraction * assets.clusters.faces[assets.root[asset]])
     return AssetPlan(np.flatnonzero(whole), own.take(~whole[own.instance]))
+
+
+#: Bytes that Cycles takes for a triangle of an asset with its tree, and for an instance; what Blender takes for one.
+CYCLES_TRIANGLE, CYCLES_INSTANCE, BLENDER_INSTANCE = 290.0, 1_670.0, 160.0
+#: Fraction of the memory that is left which assets that Cycles loads may take.
+SAFE = 0.8
+#: Triangles of all instances up to which EEVEE draws them as fast as what would take their place.
+EEVEE_FEW = 2_000_000
+#: Fraction of an instance that is to be real for EEVEE to draw all of it.
+EEVEE_WHOLE = 0.6
+#: The same for Cycles, which is better off with one instance than with some hundred of clusters.
+CYCLES_WHOLE = 0.1
+#: More than any fraction.
+NEVER = 2.0
+
+
+@dataclass(frozen=True)
+class AssetCosts:
+    """What there is of each asset (a)."""
+
+    triangles: Integers  # (a,)
+    instances: Integers  # (a,)
+    #: (a,): pixels of the image that its instances would cover if nothing hid them; infinite where that is not known.
+    pixels: Floats
+
+    def plain(self, cycles: bool, left: float) -> bool:
+        """Whether all instances are best left as they are, with so many bytes left."""
+        if not cycles:
+            return bool((self.triangles * self.instances).sum() <= EEVEE_FEW)
+        return bool(self._loaded.sum() + self._of_instances.sum() <= SAFE * left)
+
+    def originals(self, cycles: bool, left: float, always: bool = True) -> OriginalPolicy:
+        """How instances are drawn that are refined: because not all can be the originals, or whatever it costs.
+
+        always: whether some assets may be the originals everywhere.
+        """
+        kept = np.zeros(len(self.triangles), bool)
+        if not cycles:
+            return OriginalPolicy(kept, EEVEE_WHOLE)
+        if not always and self.plain(cycles, left):
+            return OriginalPolicy(kept, CYCLES_WHOLE, shared=True, kites=False)
+        # Those that cover most for what they take; none but these is loaded at all.
+        cost = self._loaded + self._of_instances
+        if always:
+            order = np.argsort(-self.pixels / np.maximum(cost, 1.0), kind="stable")
+            room = SAFE / 2 * left
+            for one in order.tolist():  # of some dozens; one that does not fit keeps no other out
+                kept[one] = cost[one] <= room
+                room -= cost[one] if kept[one] else 0.0
+        return OriginalPolicy(kept, NEVER, shared=True)
+
+    @property
+    def _loaded(self) -> Floats:
+        return CYCLES_TRIANGLE * self.triangles
+
+    @property
+    def _of_instances(self) -> Floats:
+        return (CYCLES_INSTANCE + BLENDER_INSTANCE) * self.instances

@@ -7,19 +7,17 @@ full. Where facets are larger, there are fewer, as their area is. Where there ar
 to be. Shells have one size; there, real leaves go to the tetrahedra that gain most by them for each polygon.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..arrays import Floats
 from ..camera.camera import Camera
 from ..refinement.decisions import Decision, contributions
 from ..refinement.loop import Refinement
 from ..refinement.settings import RefinementSettings
 from .drawing import HIDDEN_A_PIXEL, OUTSIDE_A_PIXEL
-from .leaf_detail import TOLERANCE
+from .plants import TOLERANCE
 
 #: Approximate bytes of a polygon in Blender (110) and in a renderer (500) together.
 BYTES_PER_POLYGON = 610
@@ -139,7 +137,7 @@ def _fitted_shells(result: Refinement, allowed: float, faces: float) -> Refineme
     return replace(result, decision=decision)
 
 
-def _large(result: Refinement) -> NDArray[np.float64]:
+def _large(result: Refinement) -> Floats:
     """Polygons (cells,) that stay polygons although their cell is a proxy."""
     held = result.cell_polygons.polygons
     large = np.isinf(held.totals.width)

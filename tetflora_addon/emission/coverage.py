@@ -1,25 +1,28 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Coverage of the image by what is drawn: where pixels are full, what lies behind is hidden, and nothing else is.
+"""What lies behind what: coverage of the image by what is drawn, and how deep in the shade of others things are.
 
 The paper renders front to back and keeps an alpha buffer (sections 6.3 and 7). What is drawn here is opaque, so that a
-depth for each pixel says the same: a pixel is full from the depth of what covers its center on. Parts are tested by
-their bounds against the farthest depth in the rectangle of pixels that they touch, as by Greene, Kass and Miller
-("Hierarchical Z-buffer visibility", SIGGRAPH 1993), but from maxima of overlapping squares; a part is hidden only where
-all of that is full before it begins.
+depth for each pixel says the same: a pixel is full from the depth of what covers its center on. Where pixels are full,
+what lies behind is hidden, and nothing else is. Parts are tested by their bounds against the farthest depth in the
+rectangle of pixels that they touch, as by Greene, Kass and Miller ("Hierarchical Z-buffer visibility", SIGGRAPH 1993),
+but from maxima of overlapping squares; a part is hidden only where all of that is full before it begins.
+
+What lies deep in the shade owes the image nothing but to keep light out. Optical depths add up along the light as they
+do along a view (paper, section 6.3): areas on a grid across the light, layer by layer, and their cumulative sum.
 """
 
-from __future__ import annotations
-
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import Arrays, chunks, in_axes, spread
+from ..arrays import Arrays, Floats, Floats32, Integers, Mask, chunks, in_axes, spread
 from ..camera.camera import Camera, circle_of_confusion
 from ..parallel import blocks
+from ..refinement.lights import Light, frame_toward, sun_of
 
 #: Pixels around the image that count as part of it: the filter of a renderer reaches there.
 MARGIN = 2
@@ -40,9 +43,9 @@ class Footprints(Arrays):
     """What things (n) may touch of the image."""
 
     #: low and high, (n, 2): corners of a rectangle that holds each of them, pixels from the lower left of the buffer.
-    low: NDArray[np.float32]
-    high: NDArray[np.float32]
-    near: NDArray[np.float32]  # (n,): least depth, meters
+    low: Floats32
+    high: Floats32
+    near: Floats32  # (n,): least depth, meters
 
 
 class Coverage:
@@ -67,7 +70,7 @@ class Coverage:
         first, end = (0, wide.width) if tile is None else tile
         self.first, self.end = max(first, 0), min(end, wide.width)
         self.depth = np.full((wide.height, self.end - self.first), np.inf, np.float32)
-        self._maxima: NDArray[np.float32] | None = None
+        self._maxima: Floats32 | None = None
         left, right, bottom, top = wide.window
         self._scale = np.array([wide.width / (right - left), wide.height / (top - bottom)])
 
@@ -75,14 +78,14 @@ class Coverage:
         """Columns and rows (n,) in pixels, and depths (n,) in meters, of points (n, 3)."""
         return _projected(self.camera, points, self._scale)
 
-    def cells(self, column: NDArray[np.floating], row: NDArray[np.floating]) -> NDArray[np.int64]:
+    def cells(self, column: NDArray[np.floating], row: NDArray[np.floating]) -> Integers:
         """Cells (n,) of the image that columns and rows (n,) lie in, or come nearest to."""
         height, width = self.depth.shape
         across = np.clip(np.nan_to_num(column - self.first), 0, width - 1).astype(np.int64) // CELL
         up = np.clip(np.nan_to_num(row), 0, height - 1).astype(np.int64) // CELL
         return up * (width // CELL + 1) + across
 
-    def of_spheres(self, center: NDArray[np.float64], radius: NDArray[np.float64]) -> Footprints:
+    def of_spheres(self, center: Floats, radius: Floats) -> Footprints:
         """Footprints of spheres around points (n, 3), radii (n,) in meters.
 
         Those that reach behind the eye's plane may touch everything, unless they are out of view as a whole.
@@ -115,9 +118,7 @@ class Coverage:
             low[round_], high[round_] = -np.inf, np.inf
         return Footprints(low.astype(np.float32), high.astype(np.float32), near.astype(np.float32))
 
-    def of_lines(
-        self, start: NDArray[np.float64], end: NDArray[np.float64], radius: NDArray[np.float64], within: Footprints
-    ) -> Footprints:
+    def of_lines(self, start: Floats, end: Floats, radius: Floats, within: Footprints) -> Footprints:
         """Footprints of what reaches so far (n,) from lines between points (n, 3), within others (n,); meters.
 
         Those of which an end reaches behind the eye's plane have the others.
@@ -128,9 +129,7 @@ class Coverage:
         high = np.where(ahead[:, None], np.minimum(np.maximum(a.high, b.high), within.high), within.high)
         return Footprints(low, high, np.where(ahead, np.maximum(np.minimum(a.near, b.near), within.near), within.near))
 
-    def tested(
-        self, corners: NDArray[np.floating], wider: float
-    ) -> tuple[Footprints, NDArray[np.bool_], list[Projected]]:
+    def tested(self, corners: NDArray[np.floating], wider: float) -> tuple[Footprints, Mask, list[Projected]]:
         """Which polygons with corners (n, k, 3), meters, are hidden if they are so many pixels wider on each side.
 
         Returns these wider footprints (n), a mask (n,), and where the corners of all others are, block by block.
@@ -183,7 +182,7 @@ class Coverage:
             spread_ = np.maximum(spread_, np.hypot(there[0] - here[0], there[1] - here[1]))
         return spread_
 
-    def outside(self, prints: Footprints) -> NDArray[np.bool_]:
+    def outside(self, prints: Footprints) -> Mask:
         """Things (n,) of which nothing is in the image."""
         return (
             (prints.high[:, 0] < 0)
@@ -192,7 +191,7 @@ class Coverage:
             | (prints.low[:, 1] > self.height)
         )
 
-    def hidden(self, prints: Footprints) -> NDArray[np.bool_]:
+    def hidden(self, prints: Footprints) -> Mask:
         """Things (n,) behind full pixels wherever they are in the image; those outside are."""
         if self._maxima is None:
             self._maxima = _maxima(self.depth)
@@ -245,9 +244,7 @@ class Coverage:
             np.minimum.at(flat, (py * self.depth.shape[1] + px - self.first)[inside], z)
 
 
-def _projected(
-    camera: Camera, points: NDArray[np.floating], scale: NDArray[np.float64]
-) -> tuple[NDArray, NDArray, NDArray]:
+def _projected(camera: Camera, points: NDArray[np.floating], scale: Floats) -> tuple[NDArray, NDArray, NDArray]:
     """`Coverage.project` for a camera with so many pixels (2,) for each unit of its window."""
     left, _, bottom, _ = camera.window
     own = in_axes(points, camera.frame * [1.0, 1.0, -1.0], camera.position)
@@ -260,9 +257,7 @@ def _projected(
     return (across - left) * scale[0], (up - bottom) * scale[1], depth
 
 
-def _covered(
-    column: NDArray, row: NDArray, depth: NDArray, t: NDArray, x: NDArray, y: NDArray
-) -> tuple[NDArray[np.bool_], NDArray[np.float64]]:
+def _covered(column: NDArray, row: NDArray, depth: NDArray, t: NDArray, x: NDArray, y: NDArray) -> tuple[Mask, Floats]:
     """Whether triangles t (m,) cover points x, y (m,), and their depths (m,) there."""
     ax, bx, cx = (np.take(column[k], t) - x for k in range(3))
     ay, by, cy = (np.take(row[k], t) - y for k in range(3))
@@ -275,7 +270,7 @@ def _covered(
     return inside, np.abs(whole) / np.maximum(inverse, 1e-30)
 
 
-def _maxima(depth: NDArray[np.float32]) -> NDArray[np.float32]:
+def _maxima(depth: Floats32) -> Floats32:
     """Largest depths of squares of 1, 2, 4, ... pixels whose lower left is each pixel; beyond the image nothing is."""
     out = np.empty((int(np.log2(max(depth.shape))) + 1, *depth.shape), np.float32)
     out[0] = depth
@@ -286,3 +281,52 @@ def _maxima(depth: NDArray[np.float32]) -> NDArray[np.float32]:
         wide[:] = new
         np.maximum(wide[:, :-side], new[:, side:], out=wide[:, :-side])
     return out
+
+
+#: Cells of the grid across the light along each side, and layers along it, at most.
+CELLS, LAYERS = 192, 64
+#: Least side of a cell, meters: an even fog of leaves knows nothing of smaller gaps.
+LEAST = 1.0
+_DOWN = np.array([0.0, 0.0, -1.0])
+
+
+class Shade:
+    """Optical depth between a place and the strongest light.
+
+    Parameters
+    ----------
+    position : (m, 3) float
+        Places that stand for areas (m,), meters.
+    area : (m,) float
+        One-sided area of sheets, m².
+    lights : sequence of Light
+        Of several the brightest sun counts; without any, the sky above.
+    """
+
+    def __init__(self, position: NDArray[np.floating], area: NDArray[np.floating], lights: Sequence[Light]) -> None:
+        sun = sun_of(lights)
+        self._frame = frame_toward(_DOWN if sun is None else -sun)
+        if not len(position):
+            self._table = None
+            return
+        places = in_axes(np.asarray(position, np.float64), self._frame)
+        low, high = places.min(axis=0), places.max(axis=0)
+        step = np.maximum((high - low)[:2].max() / CELLS, LEAST)
+        self._low, self._high, self._step = low, high, np.array([step, step, max((high - low)[2] / LAYERS, LEAST)])
+        self._size = np.floor((high - low) / self._step).astype(np.int64) + 1
+        table = np.bincount(self._index(places), np.asarray(area, np.float64), int(self._size.prod()))
+        # Randomly turned sheets show half of their area. Light comes from where the third coordinate is largest.
+        table = table.reshape(self._size) * (0.5 / step**2)
+        self._table = (np.cumsum(table[:, :, ::-1], axis=2)[:, :, ::-1] - 0.5 * table).ravel()
+
+    def _index(self, places: Floats) -> Integers:
+        at = np.clip(np.floor((places - self._low) / self._step), 0, self._size - 1).astype(np.int64)
+        return (at[:, 0] * self._size[1] + at[:, 1]) * self._size[2] + at[:, 2]
+
+    def depth(self, points: Floats, nearer: Floats | float = 0.0) -> Floats:
+        """Optical depth (n,) of all that is between the light and points (n, 3), moved so many meters toward it."""
+        if self._table is None:
+            return np.zeros(len(points))
+        places = in_axes(points, self._frame)
+        places[:, 2] += nearer
+        return np.take(self._table, self._index(places))

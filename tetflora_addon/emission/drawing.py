@@ -8,8 +8,6 @@ primitive by primitive. What nobody sees only casts shadows and sends light back
 of which lies behind full pixels as a whole.
 """
 
-from __future__ import annotations
-
 import itertools
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -18,7 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import Arrays, Keys, gathered, unit
+from ..arrays import Arrays, Floats, Floats32, Integers, Keys, Mask, gathered, unit
 from ..buffers import MeshBuffers, concatenate_buffers, kept_faces
 from ..camera.camera import Camera
 from ..compiled.flora import Flora
@@ -32,12 +30,11 @@ from ..refinement.contents import polygon_totals
 from ..refinement.loop import Refinement
 from ..refinement.shared_parts import SharePoints
 from .asset_plan import PlacedClusters
-from .coverage import Coverage
-from .faces import FaceRows, Faces
+from .coverage import Coverage, Shade
 from .frontier import DETAIL, FEW, Frontier, FrontierKind, Shown, Waiting, Whose
 from .plant_parts import GrownPlants, PlantRows
 from .plants import Block, Transition
-from .shade import Shade
+from .polygons import FaceRows, Faces
 
 #: Least width of a tile, pixels, and pixels around it that its coverage knows.
 TILE, AROUND = 240, 64
@@ -116,7 +113,7 @@ class Drawing:
     hidden: float  # sides of facets over those that are asked for: the larger, the fewer stand for what is not seen
     shadows: ShadowReach
     shade: Shade
-    occluders: NDArray[np.float64]  # (t, 3, 3): triangles of opaque polygons, meters
+    occluders: Floats  # (t, 3, 3): triangles of opaque polygons, meters
     form: FacetConverter | None = None  # what becomes of facets where they are made; without, they stay what they are
     most: float = np.inf  # polygons and facets that there may be, should what is expected be wrong
     shadow: float = 0.0  # pixels down to which shadows of what is not seen are refined; 0 leaves them coarse
@@ -130,7 +127,7 @@ def drawing(
     facet: float,
     weights: FacetWeights,
     hidden: float = 1.0,
-    occluders: NDArray[np.float64] | None = None,
+    occluders: Floats | None = None,
     form: FacetConverter | None = None,
     most: float = np.inf,
     shadow: float = 0.0,
@@ -222,7 +219,9 @@ def _drawn_tile(
     number, columns, parts, share = item
     tile = _Tile(given, columns)
     if columns is None:
-        tile.draw_outside(parts, share)
+        # Parts out of view, a share of all of them.
+        pools = list(map(tile.frontier.pool, tile.given.kinds, parts))
+        tile._draw_outside(pools, share, _UNSEEN * share * tile.given.most)
         return tile.made(number)
     tile.draw(parts, (columns[1] - columns[0]) / tile.coverage.width, share * given.most)
     return tile.made(number)
@@ -239,7 +238,7 @@ class _Tile:
         self._meshes: dict[tuple[str, int, int], list[MeshBuffers]] = {}
         self._facets: dict[tuple[Whose, bool], list[Primitive]] = {}
         # What was made between two depths: whose facets, or kinds and meshes, and their corners.
-        self._waiting: list[tuple[Any, Any, NDArray[np.float32]]] = []
+        self._waiting: list[tuple[Any, Any, Floats32]] = []
         self.number = 0.0
         self._drawn = 0.0  # those of what is seen
         self._asked = 0.0  # polygons and facets that there would be with sides as they are asked for
@@ -298,7 +297,7 @@ class _Tile:
             return
         extent_around = self.given.camera.extent_around
 
-        def size(mesh: MeshBuffers) -> NDArray[np.float64]:
+        def size(mesh: MeshBuffers) -> Floats:
             faces = _facets_of_faces(*_corners_of_faces(mesh), mesh, np.arange(mesh.polygons))
             return faces.side / extent_around(faces.center)
 
@@ -322,11 +321,6 @@ class _Tile:
                     del self._facets[what]
             self.number, number = self.number - gone, number - gone
 
-    def draw_outside(self, parts: Sequence[Arrays], share: float) -> None:
-        """Parts out of view, a share of all of them."""
-        pools = list(map(self.frontier.pool, self.given.kinds, parts))
-        self._draw_outside(pools, share, _UNSEEN * share * self.given.most)
-
     # -- what is seen ---------------------------------------------------------------------------------------------
 
     def add_facets(self, whose: Whose, facets: Facets) -> None:
@@ -334,9 +328,7 @@ class _Tile:
         if len(facets):
             self._waiting.append((whose, facets, triangle_corners(facets)))
 
-    def thin(
-        self, key: Keys, center: NDArray[np.floating], radius: NDArray[np.floating]
-    ) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
+    def thin(self, key: Keys, center: NDArray[np.floating], radius: NDArray[np.floating]) -> tuple[Integers, Floats]:
         """As of `Canvas`."""
         times, left = np.ones(len(key)), np.arange(len(key))
         center = center.astype(np.float32)
@@ -377,7 +369,7 @@ class _Tile:
         for *_, drawn in tested:
             for polygons in drawn:
                 self._fill(*polygons)
-        lost: dict[Whose, list[tuple[Facets, NDArray[np.float64]]]] = {}
+        lost: dict[Whose, list[tuple[Facets, Floats]]] = {}
         for (what, made, corners), (prints, gone, _) in zip(waiting, tested, strict=True):
             seen = np.flatnonzero(~gone)
             gone[seen] = self.coverage.hidden(prints.take(seen))
@@ -416,7 +408,7 @@ class _Tile:
         """Part of hidden facets that are kept as they are, at most, where nothing near can stand for them."""
         return 0.5 / self.given.hidden**2
 
-    def _merge(self, facets: Facets, number: NDArray[np.float64], whose: Whose) -> None:
+    def _merge(self, facets: Facets, number: Floats, whose: Whose) -> None:
         """Few large facets for many that are hidden, by a random number (n,) of each.
 
         Each lies behind full pixels as a whole. Those that can be large stand for all others in their cell of the
@@ -441,7 +433,7 @@ class _Tile:
         facets = facets.take(kept)
         self._keep(replace(facets, side=facets.side * np.sqrt(times[kept])), False, whose)
 
-    def _hidden(self, facets: Facets) -> NDArray[np.bool_]:
+    def _hidden(self, facets: Facets) -> Mask:
         """Facets (n,) behind full pixels."""
         return self.coverage.hidden(self.coverage.of_corners(triangle_corners(facets))[0])
 
@@ -484,7 +476,7 @@ class _Tile:
         self._draw_unseen(fine, sides, min(LIT_TIMES * free, room), add, leaves)
         self._draw_unseen(pools, list(map(self._sides_outside, pools)), few, add)
 
-    def _sides_outside(self, pool: Waiting) -> NDArray[np.float64]:
+    def _sides_outside(self, pool: Waiting) -> Floats:
         """Sides (n,) of facets of parts out of view, meters."""
         away = self.given.camera.distance_to_view(pool.center)
         fallen = self.given.shadows.distance(pool.center, away, pool.radius)
@@ -519,7 +511,7 @@ class _Tile:
     def _draw_unseen(
         self,
         pools: list[Waiting],
-        sides: list[NDArray[np.float64]],
+        sides: list[Floats],
         most: float,
         add: Callable[[Facets, Whose], None],
         leaves: float = HIDDEN_LEAVES,
@@ -548,7 +540,7 @@ class _Tile:
             self._facets.setdefault((whose, seen), []).append(facets if form is None else form(facets, seen))
 
 
-def _keys_of(center: NDArray[np.float64]) -> NDArray[np.uint64]:
+def _keys_of(center: Floats) -> NDArray[np.uint64]:
     """Keys (n,) of things by their places (n, 3), to a tenth of a millimeter."""
     key = np.zeros(len(center), np.uint64)
     for axis in range(3):
@@ -556,7 +548,7 @@ def _keys_of(center: NDArray[np.float64]) -> NDArray[np.uint64]:
     return key
 
 
-def _places(drawn: Primitive) -> NDArray[np.float64]:
+def _places(drawn: Primitive) -> Floats:
     """A place (n, 3) of each facet, or of what is drawn for it."""
     return drawn.corners[:, 0].astype(np.float64) if isinstance(drawn, Triangles) else drawn.center.astype(np.float64)
 
@@ -569,20 +561,18 @@ def quarters(facets: Facets) -> Facets:
     return Facets.concatenate([*parts, replace(half, across=-facets.across, along=-facets.along)])
 
 
-def _corners_of_faces(mesh: MeshBuffers) -> tuple[NDArray[np.float32], NDArray[np.integer]]:
+def _corners_of_faces(mesh: MeshBuffers) -> tuple[Floats32, Integers]:
     """Corners (f, k, 3) of one or more faces, the last of which repeats beyond their size (f,), and that."""
     size, first = np.diff(mesh.face_offsets), mesh.face_offsets[:-1]
     every = first[:, None] + np.minimum(np.arange(int(size.max())), size[:, None] - 1)
     return mesh.positions[mesh.corner_verts[every]], size
 
 
-def _facets_of_faces(
-    corners: NDArray[np.float32], size: NDArray[np.integer], buffers: MeshBuffers, faces: NDArray[np.intp]
-) -> Facets:
+def _facets_of_faces(corners: Floats32, size: Integers, buffers: MeshBuffers, faces: Integers) -> Facets:
     """Facets in the place of faces (n,) with corners (n, k, 3), the last of which repeats beyond their size (n,)."""
     corners = corners.astype(np.float64)
 
-    def middle(values: NDArray[np.float64]) -> NDArray[np.float64]:
+    def middle(values: Floats) -> Floats:
         return (values.sum(axis=1) - (values.shape[1] - size)[:, None] * values[:, -1]) / size[:, None]
 
     center = middle(corners)

@@ -2,17 +2,14 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Kinds of proxies in the engine: buffers, sizes and memory. `results.proxy_kinds` has their labels."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
 from functools import partial
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ..arrays import Floats
+from ..arrays import Floats, Integers
 from ..buffers import MeshBuffers, PointBuffers
 from ..camera.camera import Camera
 from ..compiled.flora import Flora
@@ -32,12 +29,10 @@ from ..refinement.lights import sun_of
 from ..refinement.loop import Refinement
 from .asset_plan import AssetPlan, OriginalPolicy, explicit_plan
 from .drawing import Drawing, FacetConverter, Parts, drawn_blocks
-from .faces import FaceRows
 from .frontier import Shown
-from .leaf_detail import TOLERANCE
 from .light import BakedLight, baked_attributes
-from .plants import Block, explicit_blocks
-from .polygons import PolygonBlock, kept_polygons, polygon_blocks
+from .plants import TOLERANCE, Block, explicit_blocks
+from .polygons import FaceRows, PolygonBlock, kept_polygons, polygon_blocks
 from .shells import proxy_shells
 
 Buffers = MeshBuffers | PointBuffers
@@ -162,10 +157,6 @@ class AsSpheres:
         return spheres_of(facets, self.camera if seen else None, self.disc, self.sun)
 
 
-def _triangles_everywhere(_camera: Camera, _disc: float, _sun: Floats | None) -> FacetConverter:
-    return as_triangles
-
-
 def facet_blocks(refined: EmissionInput) -> Iterator[Buffers]:
     """Facets as the form of the drawing has made them: triangles, spheres, or triangles where they are seen."""
     for parts in refined.facet_parts():
@@ -186,7 +177,7 @@ def shell_blocks(
         yield shells
 
 
-def _numbered(refined: EmissionInput, first_sheet: int) -> Iterator[tuple[Parts, Facets, NDArray[np.int64]]]:
+def _numbered(refined: EmissionInput, first_sheet: int) -> Iterator[tuple[Parts, Facets, Integers]]:
     """Blocks of facets, each as parts and as one, with the sheets (n,) that they are in baked light."""
     for parts in refined.facet_parts():
         facets = joined([some for some, _ in parts])
@@ -209,7 +200,7 @@ def _baked_spheres(refined: EmissionInput, light: BakedLight, first_sheet: int) 
         yield replace(made, attributes={**made.attributes, **baked}, species=parts.species, look=parts.look)
 
 
-MICROSURFACES = ProxyEmitter(facet_blocks, _triangles_everywhere, _baked_facets)
+MICROSURFACES = ProxyEmitter(facet_blocks, lambda _camera, _disc, _sun: as_triangles, _baked_facets)
 MICROSPHERES = ProxyEmitter(facet_blocks, partial(AsSpheres, seen_too=True), _baked_spheres)
 #: Facets where they are seen, spheres elsewhere. Where light is baked, all are facets.
 AUTOMATIC = ProxyEmitter(facet_blocks, partial(AsSpheres, seen_too=False), _baked_facets)

@@ -9,16 +9,14 @@ the next ones follow. Each part is opened once, and everything that is made foll
 what to open before anything is drawn (`refinement`); what is hidden is decided here.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import Protocol
+from typing import Protocol, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import Arrays, Keys
+from ..arrays import Arrays, Floats, Integers, Keys, Mask
 from ..buffers import MeshBuffers
 from ..proxies.microsurfaces import Facets
 from .coverage import CELL, Coverage, Footprints
@@ -46,11 +44,11 @@ class Waiting(Arrays):
     """Parts (n) of one kind, and spheres around them."""
 
     parts: Arrays  # of n
-    center: NDArray[np.float64]  # (n, 3)
-    radius: NDArray[np.float64]  # (n,): meters
-    near: NDArray[np.float64]  # (n,): least depth of the sphere, meters
-    cell: NDArray[np.int64]  # (n,): cell of the image that its middle is in
-    count: NDArray[np.float64]  # (n,): facets that they would have, all of them
+    center: Floats  # (n, 3)
+    radius: Floats  # (n,): meters
+    near: Floats  # (n,): least depth of the sphere, meters
+    cell: Integers  # (n,): cell of the image that its middle is in
+    count: Floats  # (n,): facets that they would have, all of them
 
 
 class Canvas(Protocol):
@@ -62,9 +60,7 @@ class Canvas(Protocol):
     def add_mesh(self, what: tuple[str, int, int], buffers: MeshBuffers | None, culled: bool = False) -> None:
         """A mesh of a species, without faces behind full pixels if it is culled."""
 
-    def thin(
-        self, key: Keys, center: NDArray[np.floating], radius: NDArray[np.floating]
-    ) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
+    def thin(self, key: Keys, center: NDArray[np.floating], radius: NDArray[np.floating]) -> tuple[Integers, Floats]:
         """As of `pieces.Thin`: few large ones are made in the place of many that are hidden already."""
 
     def add_shown(self, corners: NDArray[np.floating], number: float = 0.0) -> None:
@@ -77,49 +73,47 @@ class FrontierKind:
     larger = 1.0  # sides of its facets over those of plants
     stays = False  # whether parts that nobody sees may stay as they are: then none of them can stand for others
 
-    def coarser(self, _times: float) -> FrontierKind:
+    def coarser(self, _times: float) -> Self:
         """The same, of which what is drawn as itself is so many times as large before it is."""
         return self
 
-    def spheres(self, parts: Arrays) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def spheres(self, parts: Arrays) -> tuple[Floats, Floats]:
         """Middles (n, 3) of spheres around parts, and radii (n,), meters."""
-        raise NotImplementedError
+        return parts.center, parts.reach
 
     def prints(self, coverage: Coverage, slab: Waiting) -> Footprints:
         """What parts may touch of the image."""
         return coverage.of_spheres(slab.center, slab.radius)
 
-    def optical(self, parts: Arrays) -> NDArray[np.float64]:
+    def optical(self, parts: Arrays) -> Floats:
         """Area (n,) that parts block, of which something is to be drawn still, m²."""
         raise NotImplementedError
 
-    def one_leaf(self, parts: Arrays) -> NDArray[np.float64]:
+    def one_leaf(self, parts: Arrays) -> Floats:
         """Area (n,) of a leaf, m²; 0 where none is known."""
         return np.zeros(len(parts))
 
-    def draw(self, canvas: Canvas, slab: Waiting, side: NDArray[np.float64], shown: list[Shown]) -> None:
+    def draw(self, canvas: Canvas, slab: Waiting, side: Floats, shown: list[Shown]) -> None:
         """Draw parts that are seen, with facets of sides (n,), meters."""
         raise NotImplementedError
 
-    def unseen(
-        self, parts: Arrays, side: NDArray[np.float64], kept: NDArray[np.float64], shown: list[Shown]
-    ) -> Iterator[tuple[Whose, Facets]]:
+    def unseen(self, parts: Arrays, side: Floats, kept: Floats, shown: list[Shown]) -> Iterator[tuple[Whose, Facets]]:
         """Facets of sides (n,), meters, of a fraction (n,) of parts that nobody sees."""
         raise NotImplementedError
 
-    def enough(self, parts: Arrays) -> NDArray[np.float64]:
+    def enough(self, parts: Arrays) -> Floats:
         """Fraction (n,) of their area with which parts keep out as much light as with all."""
         return np.ones(len(parts))
 
-    def can_open(self, parts: Arrays) -> NDArray[np.bool_]:
+    def can_open(self, parts: Arrays) -> Mask:
         """Parts (n,) that consist of others."""
         return np.zeros(len(parts), bool)
 
-    def opened(self, parts: Arrays) -> tuple[Arrays, NDArray[np.int64]]:
+    def opened(self, parts: Arrays) -> tuple[Arrays, Integers]:
         """What parts consist of, and of which (m,) each is."""
         return parts.take(slice(0)), np.zeros(0, np.int64)
 
-    def to_be_opened(self, parts: Arrays) -> NDArray[np.bool_]:
+    def to_be_opened(self, parts: Arrays) -> Mask:
         """Parts (n,) of which some is drawn as it is, however small they are."""
         return np.zeros(len(parts), bool)
 
@@ -132,7 +126,7 @@ class FrontierKind:
         return parts
 
 
-def opaque_fractions(silhouette: NDArray[np.float64], optical: NDArray[np.float64]) -> NDArray[np.float64]:
+def opaque_fractions(silhouette: Floats, optical: Floats) -> Floats:
     """Fraction (n,) of optical areas (n,) behind silhouettes (n,), m², that lets through a few hundredths of light.
 
     A spruce has twenty layers of needles across its crown. Where it is hidden, the first of them cast its shadow.
@@ -197,7 +191,7 @@ class Frontier:
             if any(map(len, ready)):
                 yield ready
 
-    def _depths(self, pools: Sequence[Waiting], number: float) -> tuple[list[NDArray[np.float64]], int]:
+    def _depths(self, pools: Sequence[Waiting], number: float) -> tuple[list[Floats], int]:
         """Depths (n,) for parts, before which these have so many facets in each cell, about; and how many cells."""
         every, nearest, count, radius = (
             np.concatenate([getattr(pool, name) for pool in pools]) for name in ("cell", "near", "count", "radius")
@@ -217,7 +211,7 @@ class Frontier:
         depth[order] = end[group]
         return np.split(depth, np.cumsum([len(pool) for pool in pools])[:-1]), len(first)
 
-    def _decided(self, number: int, slab: Waiting, depth: NDArray[np.float64]) -> tuple[Waiting, list[Waiting]]:
+    def _decided(self, number: int, slab: Waiting, depth: Floats) -> tuple[Waiting, list[Waiting]]:
         """What is to be drawn of parts that begin before depths (n,), and what of theirs begins beyond."""
         kind, ready, later = self.kinds[number], [slab.take(slice(0))], []
         while len(slab):
@@ -239,7 +233,7 @@ class Frontier:
             slab, depth = new.take(soon), depth[soon]
         return Waiting.concatenate(ready), later
 
-    def large(self, kind: FrontierKind, pool: Waiting) -> NDArray[np.bool_]:
+    def large(self, kind: FrontierKind, pool: Waiting) -> Mask:
         """Parts (n,) that are to be opened: more of them shows than their samples tell."""
         pixels = 2.0 * pool.radius / self.coverage.camera.extent_around(pool.center)
         shows = (pixels > DETAIL) & (pool.count > FEW)

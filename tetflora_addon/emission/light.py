@@ -6,14 +6,14 @@ All surfaces that will be drawn are collected first, as sheets (`SheetList`). `b
 light, which is the paper's shadow pass, and `BakedLight` gives the light of facets, spheres, shells and faces.
 """
 
-from __future__ import annotations
-
 from collections.abc import Generator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ..arrays import Floats, Floats32, Integers
 from ..camera.camera import Camera
 from ..compiled.flora import Flora
 from ..light.buffers import LightBuffer
@@ -49,7 +49,7 @@ def shadow_steps(
     clouds: MediumCells,
     lights: Sequence[Light],
     world: World,
-    occluders: NDArray[np.float64] | None = None,
+    occluders: Floats | None = None,
     resolution: int = 512,
     ground: ArrayLike = (0.0, 0.0, 0.0),
     orders: int = ORDERS,
@@ -108,10 +108,10 @@ class Sources:
 
     lights: tuple[Light, ...]
     world: World
-    occluders: NDArray[np.float64]  # (t, 3, 3): triangles of ground and buildings, meters
-    ground: NDArray[np.float64]  # (3,): their mean color, linear
+    occluders: Floats  # (t, 3, 3): triangles of ground and buildings, meters
+    ground: Floats  # (3,): their mean color, linear
 
-    def counted_from(self, origin: NDArray[np.float64]) -> Sources:
+    def counted_from(self, origin: Floats) -> Self:
         """The same in coordinates that begin at a place (3,) of the present ones."""
         lights = tuple(light.counted_from(origin) for light in self.lights)
         return replace(self, lights=lights, occluders=self.occluders - origin)
@@ -121,7 +121,7 @@ class SheetList:
     """Small opaque surfaces that will be drawn, in the order in which they are added."""
 
     def __init__(self) -> None:
-        self._parts: list[NDArray[np.float32]] = []
+        self._parts: list[Floats32] = []
 
     def __len__(self) -> int:
         return sum(len(part) for part in self._parts)
@@ -132,18 +132,16 @@ class SheetList:
         a, b, c = half * facets.across, half * facets.along, facets.center
         self._parts.append(np.stack([c - a - b, c + a - b, c + a + b, c - a + b], axis=1).astype(np.float32))
 
-    def add_faces(
-        self, positions: NDArray[np.floating], corner_verts: NDArray[np.integer], offsets: NDArray[np.integer]
-    ) -> None:
+    def add_faces(self, positions: NDArray[np.floating], corner_verts: Integers, offsets: Integers) -> None:
         """Add faces of a mesh: positions (v, 3) in meters, ``corner_verts`` (c,), first corners (f + 1,)."""
         self._parts.append(positions[corner_verts[_four_corners(offsets)]].astype(np.float32))
 
-    def corners(self) -> NDArray[np.float32]:
+    def corners(self) -> Floats32:
         """All of them, (m, 4, 3), meters."""
         return np.concatenate(self._parts) if self._parts else np.zeros((0, 4, 3), np.float32)
 
 
-def _four_corners(offsets: NDArray[np.integer]) -> NDArray[np.int64]:
+def _four_corners(offsets: Integers) -> Integers:
     """Corners (f, 4) of faces: of more than four, four that lie apart; triangles repeat their last."""
     first, size = offsets[:-1].astype(np.int64), np.diff(offsets)
     spread = np.where(size[:, None] <= 4, np.arange(4), np.arange(4) * size[:, None] // 4)
@@ -156,15 +154,15 @@ class BakedLight:
 
     illumination: Illumination
     #: (m,): tetrahedron (index into the clouds) of each sheet, −1 where it lies in none that holds something.
-    cell: NDArray[np.int64]
+    cell: Integers
     camera: Camera
 
-    def of_facets(self, facets: Facets, sheets: NDArray[np.integer]) -> tuple[NDArray, NDArray]:
+    def of_facets(self, facets: Facets, sheets: Integers) -> tuple[NDArray, NDArray]:
         """Radiance (n, 3) of the fronts and of the backs of facets, which are these sheets (n,) of the list."""
         surface = facets.center, facets.normal, facets.color, facets.transmission
         return self.illumination.facet_radiance(*surface, self.cell[sheets], self.camera, sheets, facets.dull)
 
-    def of_spheres(self, facets: Facets, sheets: NDArray[np.integer]) -> NDArray:
+    def of_spheres(self, facets: Facets, sheets: Integers) -> NDArray:
         """Radiance (n, 3) of spheres in the place of facets, which are these sheets (n,) of the list.
 
         A sphere covers what its facet covers for the camera, and shows what the camera would see of the facet.
@@ -180,11 +178,11 @@ class BakedLight:
     def of_faces(
         self,
         positions: NDArray[np.floating],
-        corner_verts: NDArray[np.integer],
-        offsets: NDArray[np.integer],
+        corner_verts: Integers,
+        offsets: Integers,
         color: NDArray[np.floating],
         transmission: NDArray[np.floating],
-        sheets: NDArray[np.integer],
+        sheets: Integers,
     ) -> tuple[NDArray, NDArray]:
         """Radiance (f, 3) of the fronts and of the backs of a mesh's faces, which are these sheets (f,) of the list.
 
@@ -206,7 +204,7 @@ def at_vertices(values: NDArray[np.floating], corner_verts: NDArray, offsets: ND
 
 def baked_attributes(
     domain: str, front: NDArray[np.floating], back: NDArray[np.floating] | None = None
-) -> Mapping[str, tuple[str, NDArray[np.float32]]]:
+) -> Mapping[str, tuple[str, Floats32]]:
     """Attributes of baked light on a domain 'FACE' or 'POINT', in the layout of `buffers.MeshBuffers`.
 
     ``front`` (n, 3) is the linear radiance of the side to which normals point, ``back`` that of the other; by default
@@ -216,7 +214,7 @@ def baked_attributes(
     return {FRONT: (domain, front.astype(np.float32)), BACK: (domain, back.astype(np.float32))}
 
 
-def _middles(corners: NDArray[np.floating]) -> NDArray[np.float64]:
+def _middles(corners: NDArray[np.floating]) -> Floats:
     """Centers of area (m, 3) of quadrilaterals and of triangles that repeat their last corner."""
     triangle = (corners[:, 2] == corners[:, 3]).all(axis=1)[:, None]
     return np.where(triangle, corners[:, :3].mean(axis=1), corners.mean(axis=1))

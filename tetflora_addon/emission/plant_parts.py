@@ -6,15 +6,13 @@ A leaf is drawn as itself where a facet would be about as large (`plants.Transit
 tubes while they are macroscopic, and else one thin triangle each, with the direction and the area of the branch.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, fields, replace
+from typing import Self
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ..arrays import column, length
+from ..arrays import Floats, Integers, Mask, column, length
 from ..camera.camera import Camera
 from ..compiled.bounds import own_leaf_reaches
 from ..compiled.flora import Flora
@@ -58,12 +56,12 @@ class PlantRows(PlantParts):
     """Parts of plants (n) as the frontier has them: about straight lines."""
 
     #: start and end, (n, 3): of the line, meters.
-    start: NDArray[np.float64] = column(3)
-    end: NDArray[np.float64] = column(3)
-    beside: NDArray[np.float64]  # (n,): how far they reach from it, meters
+    start: Floats = column(3)
+    end: Floats = column(3)
+    beside: Floats  # (n,): how far they reach from it, meters
 
     @classmethod
-    def of(cls, flora: Flora, parts: PlantParts, lines: Axes | None = None) -> PlantRows:
+    def of(cls, flora: Flora, parts: PlantParts, lines: Axes | None = None) -> Self:
         """Parts (n,), of which the axes are known where they are branches alone that were opened just now.
 
         Sub-plants reach as far as samples of their leaves and wood.
@@ -93,12 +91,12 @@ class GrownPlants(FrontierKind):
     weights: FacetWeights
     lights: Sequence[Light]
 
-    def coarser(self, times: float) -> GrownPlants:
+    def coarser(self, times: float) -> Self:
         """As of `FrontierKind`."""
         limit, tolerance = times * self.transition.limit, times**2 * self.transition.tolerance
         return replace(self, transition=replace(self.transition, limit=limit, tolerance=tolerance))
 
-    def spheres(self, parts: PlantRows) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def spheres(self, parts: PlantRows) -> tuple[Floats, Floats]:
         """As of `FrontierKind`."""
         return 0.5 * (parts.start + parts.end), np.hypot(0.5 * length(parts.end - parts.start), parts.beside)
 
@@ -106,32 +104,32 @@ class GrownPlants(FrontierKind):
         """As of `FrontierKind`: most parts are long and thin."""
         return coverage.of_lines(slab.parts.start, slab.parts.end, slab.parts.beside, super().prints(coverage, slab))
 
-    def optical(self, parts: PlantParts) -> NDArray[np.float64]:
+    def optical(self, parts: PlantParts) -> Floats:
         """As of `FrontierKind`."""
         return parts.totals.optical_area
 
-    def one_leaf(self, parts: PlantParts) -> NDArray[np.float64]:
+    def one_leaf(self, parts: PlantParts) -> Floats:
         """As of `FrontierKind`."""
         return self.flora.one_leaf_area(parts.branches)
 
-    def enough(self, parts: PlantParts) -> NDArray[np.float64]:
+    def enough(self, parts: PlantParts) -> Floats:
         """As of `FrontierKind`."""
         bound = extents(self.flora, parts.branches, farthest=False)
         silhouette = 2.0 * bound[:, 0] * (bound[:, 2] - bound[:, 1]) * parts.branches.length**2
         whole = parts.branch_only | ~parts.can_open(self.flora)
         return np.where(whole, 1.0, opaque_fractions(silhouette, parts.totals.optical_area))
 
-    def can_open(self, parts: PlantParts) -> NDArray[np.bool_]:
+    def can_open(self, parts: PlantParts) -> Mask:
         """As of `FrontierKind`."""
         return parts.can_open(self.flora)
 
-    def opened(self, parts: PlantRows) -> tuple[PlantRows, NDArray[np.int64]]:
+    def opened(self, parts: PlantRows) -> tuple[PlantRows, Integers]:
         """As of `FrontierKind`."""
         made = [(PlantRows.of(self.flora, new, lines), of) for new, of, lines in opened(self.flora, parts)]
         owner = np.concatenate([np.zeros(0, np.int64), *(of for _, of in made)])
         return PlantRows.concatenate([new for new, _ in made]), owner
 
-    def to_be_opened(self, parts: PlantParts) -> NDArray[np.bool_]:
+    def to_be_opened(self, parts: PlantParts) -> Mask:
         """Those of which leaves are real."""
         return self.transition.of_branches(parts.branches) > 0.0
 
@@ -139,7 +137,7 @@ class GrownPlants(FrontierKind):
         """As of `FrontierKind`."""
         return parts.take(np.lexsort([*parts.branches.position.T, parts.branches.key]))
 
-    def draw(self, canvas: Canvas, slab: Waiting, side: NDArray[np.float64], _shown: list[Shown]) -> None:
+    def draw(self, canvas: Canvas, slab: Waiting, side: Floats, _shown: list[Shown]) -> None:
         """As of `FrontierKind`."""
         parts, branches = slab.parts, slab.parts.branches
         extent = self.camera.extent_around(slab.center)
@@ -149,7 +147,7 @@ class GrownPlants(FrontierKind):
         self._draw_branches(canvas, branches.take(np.flatnonzero(lines)), side[lines])
 
     def unseen(
-        self, parts: PlantParts, side: NDArray[np.float64], kept: NDArray[np.float64], _shown: list[Shown]
+        self, parts: PlantParts, side: Floats, kept: Floats, _shown: list[Shown]
     ) -> Iterator[tuple[Whose, Facets]]:
         """As of `FrontierKind`."""
         species = self.flora.species_of(parts.branches.row)
@@ -161,32 +159,25 @@ class GrownPlants(FrontierKind):
             if len(some):
                 yield (s, ""), self._of_pieces(as_pieces(parts.branches.take(some)), side[some])
 
-    def _draw_subplants(self, canvas: Canvas, branches: Branches, side: NDArray[np.float64]) -> None:
+    def _draw_subplants(self, canvas: Canvas, branches: Branches, side: Floats) -> None:
         if not len(branches):
             return
-        leaf, species = (
-            np.maximum(side, np.sqrt(self.flora.one_leaf_area(branches))),
-            self.flora.species_of(branches.row),
-        )
+        leaf = np.maximum(side, np.sqrt(self.flora.one_leaf_area(branches)))
+        species = self.flora.species_of(branches.row)
         for s in np.flatnonzero(np.bincount(species)).tolist():
             some = np.flatnonzero(species == s)
             own = branches.take(some)
             canvas.add_facets((s, ""), self._of_subplants(own, leaf[some], side[some], thin=canvas.thin))
 
     def _of_subplants(
-        self,
-        branches: Branches,
-        leaf: NDArray[np.float64],
-        wood: NDArray[np.float64],
-        left_out: NDArray[np.float64] | None = None,
-        thin: Thin | None = None,
+        self, branches: Branches, leaf: Floats, wood: Floats, left_out: Floats | None = None, thin: Thin | None = None
     ) -> Facets:
         count = self._optical(branches) / np.maximum(leaf, 1e-12) ** 2
         weight = self.weights.of_subplants(branches.row, count, leaf_shares(self.flora, branches))
         lit = None if thin is None else self._lit(branches, leaf)
         return subplant_facets(self.flora, branches, leaf, wood, weight, left_out, lit, thin)
 
-    def _draw_branches(self, canvas: Canvas, branches: Branches, side: NDArray[np.float64]) -> None:
+    def _draw_branches(self, canvas: Canvas, branches: Branches, side: Floats) -> None:
         """Branches alone: leaves that are large are real, wood is tubes or thin triangles, the rest is facets."""
         if not len(branches):
             return
@@ -215,14 +206,7 @@ class GrownPlants(FrontierKind):
             canvas.add_mesh(("bark", 0, s), tube_buffers(flora, [broad], detail.wood))
             self._draw_twigs(canvas, s, whole.take(np.flatnonzero(own & ~tubes)), side, extent)
 
-    def _draw_twigs(
-        self,
-        canvas: Canvas,
-        species: int,
-        whole: WholeBranches,
-        side: NDArray[np.float64],
-        extent: NDArray[np.float64],
-    ) -> None:
+    def _draw_twigs(self, canvas: Canvas, species: int, whole: WholeBranches, side: Floats, extent: Floats) -> None:
         """One thin triangle or ribbon each, or of very thin ones wider ones of fewer."""
         branches = whole.branches
         area = np.pi * branches.radius * branches.length
@@ -239,9 +223,9 @@ class GrownPlants(FrontierKind):
     def _of_pieces(
         self,
         pieces: Pieces,
-        side: NDArray[np.float64],
-        explicit: NDArray[np.float64] | None = None,
-        whole: tuple[WholeBranches, NDArray[np.integer]] | None = None,
+        side: Floats,
+        explicit: Floats | None = None,
+        whole: tuple[WholeBranches, Integers] | None = None,
         thin: Thin | None = None,
     ) -> Facets:
         """Facets of pieces: of their leaves where whole branches (n,) are seen, else of their wood as well.
@@ -257,9 +241,9 @@ class GrownPlants(FrontierKind):
         own = (of[whole[1]] for of in (leaf, side, weight, explicit))
         return piece_facets(flora, pieces, *own, self._lit(branches, leaf).take(whole[1]), thin, whole)
 
-    def _optical(self, branches: Branches) -> NDArray[np.float64]:
+    def _optical(self, branches: Branches) -> Floats:
         return self.flora.leaf_areas(branches) + self.flora.wood_areas(branches) / 2
 
-    def _lit(self, branches: Branches, side: NDArray[np.float64]) -> LightRatios:
+    def _lit(self, branches: Branches, side: Floats) -> LightRatios:
         """Light on facets of sides (n,) over that on the leaves of branches."""
         return light_ratios(self.flora, branches, side, self.camera, self.lights)

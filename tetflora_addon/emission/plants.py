@@ -1,31 +1,34 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Leaves that are drawn as themselves, and plants that are expanded without regard to what is seen.
+"""Leaves that are drawn as themselves, how finely, and plants that are expanded without regard to what is seen.
 
 A leaf whose width in pixels is below the limit is a facet, one that is wider by `decisions.BAND` is real; in between
 a fraction of them is real that grows with the width. Real leaves and facets are thinned out by hashes of their own
 keys: what has become real stays real as the camera comes closer, nothing pops, and the area is the same on average.
 Real leaves are single kites first, those with many planes a kite for each then, and have their faces from a few pixels
-of width on, one after another; where these can be told from what they stand for, finer ones, see `leaf_detail`.
-"""
+of width on, one after another.
 
-from __future__ import annotations
+Where these can be told from what they stand for, finer ones follow: lengths in the image say the level of
+`leaves.levels`, the coarsest whose margin is within a tolerance of the leaf's own. What counts is how long leaves of a
+branch are in the image where it comes nearest: nothing depends on the order of branches or on earlier images.
+"""
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ..arrays import Arrays, chunks
+from ..arrays import Arrays, Floats, Mask, chunks
 from ..buffers import BLOCK_POLYGONS, MeshBuffers
 from ..camera.camera import Camera
 from ..compiled.flora import Flora
 from ..growth.axes import axes
+from ..growth.foliage import envelope_reach
 from ..growth.growth import WholeBranches, trunks
 from ..growth.seeds import Branches, Seeds
 from ..leaves.kites import leaf_kites
+from ..leaves.levels import coarse_error
 from ..leaves.models import LeafModel
 from ..processes.pool import WORTH_PROCESSES, in_processes
 from ..refinement.contents import as_pieces, piece_totals
@@ -35,8 +38,75 @@ from ..refinement.shared_parts import SharedParts, SharePoints, descend
 from ..species.species import LEAF_KINDS
 from ..subplants.leaf_meshes import leaf_meshes
 from ..subplants.pieces import expand
+from ..subplants.rings import Pixels
 from ..subplants.tubes import tube_buffers
-from .leaf_detail import TOLERANCE, LeafDetail
+
+#: Pixels by which the margin of a leaf may be off.
+TOLERANCE = 0.5
+#: A leaf is no more than so many times as near as its branch, as far as this counts.
+NEARER = 4.0
+
+
+@dataclass(frozen=True)
+class LeafDetail:
+    """Lengths of leaves in the image."""
+
+    flora: Flora
+    camera: Camera
+    tolerance: float = TOLERANCE  # pixels by which margins may be off; infinite for none but the models of the species
+    beside: float = 0.0  # meters that a pixel spans at least at what is out of view, over the distance from the view
+
+    @property
+    def wood(self) -> Pixels | None:
+        """How large pixels are at wood, that is as fine as leaves; None where it is coarse everywhere."""
+        coarser, camera = self.tolerance / TOLERANCE, self.camera
+        if not np.isfinite(coarser):
+            return None
+        slope = 0.0 if camera.kind == "ORTHO" else camera.pixel_size
+        return Pixels(lambda points, reach: coarser * self._extent(points, reach), coarser * slope)
+
+    def lengths(self, whole: WholeBranches) -> Floats:
+        """Lengths (n,) of the leaves of branches in tolerances, where they come nearest.
+
+        0 where the models of the species are certainly fine enough.
+        """
+        branches, camera = whole.branches, self.camera
+        out = np.zeros(len(branches))
+        most = 1.0 / np.maximum(self._errors()[self.flora.rows["species"][branches.row]], 1e-300)
+        size = self.flora.rows["leaf_size"][branches.row].sum(axis=1) * branches.scale
+        for factor in ("leaf_size_tip", "leaf_size_young"):
+            size = size * np.maximum(self.flora.rows[factor][branches.row], 1.0)
+        beside = size + envelope_reach(self.flora.rows)[branches.row] * branches.length
+        # The base tells of most branches that they are too far away.
+        around = camera.extent_around(branches.position)
+        pixels = size / self._nearest(around, branches.length + beside) / self.tolerance
+        near = np.flatnonzero(pixels > most)
+        if not len(near):
+            return out
+        knots = whole.lines.knots[near]
+        reach = np.linalg.norm(np.diff(knots, axis=1), axis=2).max(axis=1) / 2.0 + beside[near]
+        extent = self._extent(knots.reshape(-1, 3), np.repeat(reach, knots.shape[1])).reshape(len(near), -1).min(axis=1)
+        nearest = self._nearest(extent, reach)
+        out[near] = size[near] / np.maximum(nearest, extent / NEARER) / self.tolerance
+        return out
+
+    def _errors(self) -> Floats:
+        """Largest error (species,) of a species' models."""
+        forms = ([f for kind in range(len(LEAF_KINDS)) for f in own[kind]] for own in self.flora.forms)
+        return np.array([max((coarse_error(f) for f in own), default=0.0) for own in forms])
+
+    def _extent(self, points: Floats, reach: Floats | float) -> Floats:
+        """Meters (n,) that a pixel spans at what reaches so far around points (n, 3), in view or not."""
+        moments = self.camera, *self.camera.shutter
+        away = np.min([moment.distance_to_view(points) for moment in moments], axis=0) - reach
+        return np.maximum(self.camera.extent_around(points), self.beside * np.maximum(away, 0.0))
+
+    def _nearest(self, extent: Floats, away: Floats) -> Floats:
+        """Meters (n,) that a pixel spans at things up to a distance (n,) nearer than where it spans ``extent`` (n,)."""
+        if self.camera.kind == "ORTHO":
+            return extent
+        return np.maximum(extent - self.camera.pixel_size * away, 1e-9)
+
 
 #: Pixels from which on a part that lies in explicit tetrahedra in part is opened.
 MIXED = 24.0
@@ -65,31 +135,31 @@ class Transition:
         """How finely near leaves are drawn."""
         return LeafDetail(self.flora, self.camera, self.tolerance, BESIDE)
 
-    def of_branches(self, branches: Branches) -> NDArray[np.float64]:
+    def of_branches(self, branches: Branches) -> Floats:
         """Real fraction (n,) of the leaves of sub-plants: a smooth step in the logarithm of their width."""
         return self._fraction(branches, np.where(self.flora.leaf_count > 0, self.flora.leaf_width, 0.0), self.limit)
 
-    def of_own_leaves(self, branches: Branches) -> NDArray[np.float64]:
+    def of_own_leaves(self, branches: Branches) -> Floats:
         """Real fraction (n,) of the leaves that branches themselves bear."""
         return self._fraction(branches, self._own_width, self.limit)
 
-    def of_kites(self, branches: Branches) -> Iterator[NDArray[np.float64]]:
+    def of_kites(self, branches: Branches) -> Iterator[Floats]:
         """Fractions (n,) of the real leaves of branches themselves that are single kites, and those or one a plane."""
         for widths in np.moveaxis(self.kite_widths, -1, 0):
             yield 1.0 - self._fraction(branches, self._own_width * KITES / widths, KITES)
 
     @cached_property
-    def kite_widths(self) -> NDArray[np.float64]:
+    def kite_widths(self) -> Floats:
         """Widths in pixels (r, 2) up to which the leaves of rows are kites, and have one for each plane."""
         limits = [[kite_widths(kinds) for kinds in one] for one in self.flora.forms]
         return np.array(limits)[self.flora.rows["species"], self.flora.rows["leaf_kind"]]
 
     @property
-    def _own_width(self) -> NDArray[np.float64]:
+    def _own_width(self) -> Floats:
         """Width (r,) of the leaves that branches of rows bear, meters."""
         return self.flora.rows["leaf_size"][:, 0] * self.flora.leaf.width
 
-    def _fraction(self, branches: Branches, widths: NDArray[np.float64], limit: float) -> NDArray[np.float64]:
+    def _fraction(self, branches: Branches, widths: Floats, limit: float) -> Floats:
         width = widths[branches.row] * branches.scale
         return explicit_fraction(width / np.maximum(self.camera.extent_around(branches.position), 1e-300), limit)
 
@@ -115,8 +185,8 @@ class Block:
 
 
 def inside_explicit(
-    shared: SharedParts, result: Refinement, opening: Callable[[Arrays, NDArray[np.float64]], NDArray[np.bool_]]
-) -> Iterator[tuple[Arrays, NDArray[np.float64]]]:
+    shared: SharedParts, result: Refinement, opening: Callable[[Arrays, Floats], Mask]
+) -> Iterator[tuple[Arrays, Floats]]:
     """All parts of one kind, some at a time, and the fraction (n,) of each that lies in explicit tetrahedra.
 
     Those of which something does are opened where ``opening`` wants it of parts and these fractions.

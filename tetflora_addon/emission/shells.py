@@ -2,14 +2,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Shells: proxies as closed tetrahedra with the attributes that a shader needs to show the cloud inside (paper, 7)."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..arrays import GOLDEN_TURN, spiral
+from ..arrays import GOLDEN_TURN, Floats, Floats32, Mask, spiral
 from ..buffers import MeshBuffers
 from ..compiled.flora import Flora
 from ..growth.hashing import mix, uniform
@@ -35,7 +33,7 @@ _DIRECTIONS = 64
 _CHUNK = 65_536
 
 
-def directional_mean(S: ArrayLike) -> NDArray[np.float64]:
+def directional_mean(S: ArrayLike) -> Floats:
     """Mean (n,) over all directions of κ(ω) = √(ωᵀSω), 1/m, with S (n, 6) as in `shell_buffers`.
 
     Within 1.3 % of the integral, which single orientations reach: a mean over points of a Fibonacci lattice on the half
@@ -53,7 +51,7 @@ def directional_mean(S: ArrayLike) -> NDArray[np.float64]:
     return result
 
 
-def cell_gradients(vertices: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
+def cell_gradients(vertices: ArrayLike) -> tuple[Floats, Mask]:
     """Gradients (n, 3, 3) of the barycentric coordinates of vertices 1 to 3, and cells (n,) without volume.
 
     In 1/m; zero for flat cells. Only differences of vertices (n, 4, 3) are used: the distance from the origin costs no
@@ -71,7 +69,7 @@ def cell_gradients(vertices: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np
     return gradients, flat
 
 
-def _cell_noise(corners: NDArray[np.float64]) -> NDArray[np.float64]:
+def _cell_noise(corners: Floats) -> Floats:
     """Random number (n,) in [0, 1) of each cell (n, 4, 3): the same wherever the same cell comes up again."""
     # Corners as Blender stores them, without the last bits of doubles; a sum does not depend on their order.
     places = np.ascontiguousarray(corners, dtype=np.float32) + np.float32(0.0)  # no negative zeros
@@ -156,7 +154,7 @@ def shell_buffers(
     length = np.sqrt(np.einsum("ij,ij->i", axes, axes))
     axes = np.where(length[:, None] > 0.0, axes / np.where(length > 0.0, length, 1.0)[:, None], (0.0, 0.0, 1.0))
 
-    def per_face(array: NDArray) -> tuple[str, NDArray[np.float32]]:
+    def per_face(array: NDArray) -> tuple[str, Floats32]:
         return "FACE", np.repeat(array.astype(np.float32), 4, axis=0)
 
     baked = {}
@@ -219,9 +217,7 @@ def proxy_shells(flora: Flora, result: Refinement, light: BakedLight | None = No
     return shell_buffers(vertices, color, transmission, matrices, normal, plane, rank=rank, light=baked)
 
 
-def set_apart(
-    vertices: NDArray[np.float64], matrices: NDArray[np.float64]
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def set_apart(vertices: Floats, matrices: Floats) -> tuple[Floats, Floats]:
     """Tetrahedra (n, 4, 3) a little smaller, and their S (n, 6) so much larger that they are as dark as before.
 
     Of faces at the same distance Cycles meets only one: where a ray leaves one shell and enters the next through a

@@ -7,8 +7,6 @@ for "nothing known", scale and offset are GDAL's. Compressions are those of TIFF
 Zstandard). Blender's own reader makes flat ground or noise of what it cannot decode; here damage is an error.
 """
 
-from __future__ import annotations
-
 import lzma
 import math
 import re
@@ -61,7 +59,12 @@ def read_tiff(path: Path) -> Generator[Progress, object, Raster]:
     check_regular(path)
     with path.open("rb") as file:
         tags = _Tags(file, path.name)
-        tags.check_bands()
+        # Refuse what has several values in a pixel; a second one may be what counts.
+        bands = tags.one("SamplesPerPixel", 1)
+        if bands != 1 and not (bands == 2 and tags.numbers("ExtraSamples")[:1] in ((1,), (2,))):
+            raise tags.broken(
+                "SamplesPerPixel", f"is {bands}; write one band only, for example with gdal_translate -b 1"
+            )
         (place, system), notes = _place(path, tags), []
         values, absent = yield from tags.pixels()
         absent |= ~(yield from tags.mask(values.shape))
@@ -94,7 +97,7 @@ def place_of_image(path: Path) -> Raster:
     return Raster(np.zeros((1, 1), np.float32), *place, system)
 
 
-def _place(path: Path, tags: _Tags | None = None) -> tuple[list[Floats], System]:
+def _place(path: Path, tags: "_Tags | None" = None) -> tuple[list[Floats], System]:
     """Middle of the first pixel, steps along and down, and the system, by tags or else by files beside the image."""
     place, system = (tags.place(), tags.system()) if tags is not None else (None, System())
     return world_file(path) if place is None else place, system_beside(path) if system == System() else system
@@ -173,14 +176,6 @@ class _Tags:
     def broken(self, tag: str, text: str) -> SceneError:
         """The error of a tag."""
         return SceneError(f"{self.name}: tag {tag} ({_NUMBERS[tag]}) {text}")
-
-    def check_bands(self) -> None:
-        """Refuse what has several values in a pixel; a second one may be what counts."""
-        bands = self.one("SamplesPerPixel", 1)
-        if bands != 1 and not (bands == 2 and self.numbers("ExtraSamples")[:1] in ((1,), (2,))):
-            raise self.broken(
-                "SamplesPerPixel", f"is {bands}; write one band only, for example with gdal_translate -b 1"
-            )
 
     def pixels(self) -> Generator[Progress, object, tuple[NDArray[Any], Mask]]:
         """Values (h, w) of the first sample, and which pixels are not in the file, (h, w); yields progress."""

@@ -594,10 +594,8 @@ def _child(node: _Node, *names: str) -> _Node | None:
 
 def _well_known(node: _Node) -> System:
     """The system of a node of well-known text."""
-    projected, flat = (
-        ("PROJCS", "PROJCRS", "PROJECTEDCRS"),
-        ("GEOGCS", "GEOGCRS", "GEODCRS", "GEOGRAPHICCRS", "GEODETICCRS"),
-    )
+    projected = ("PROJCS", "PROJCRS", "PROJECTEDCRS")
+    flat = ("GEOGCS", "GEOGCRS", "GEODCRS", "GEOGRAPHICCRS", "GEODETICCRS")
     while node[0] not in projected + flat:
         inner = _child(node, "SOURCECRS", "COMPD_CS", "COMPOUNDCRS", *projected, *flat)
         if inner is None:

@@ -2,14 +2,13 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Rasters of heights: where their cells lie, ASCII grids, world files, and values between cells."""
 
-from __future__ import annotations
-
 import re
 import warnings
 from collections.abc import Generator
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -54,7 +53,7 @@ class Raster:
         """Column and row, (n, 2), of places given by their coordinates."""
         return np.linalg.solve(np.stack([self.along, self.down]).T, (points - self.corner).T).T
 
-    def part(self, cells: Floats) -> Raster:
+    def part(self, cells: Floats) -> Self:
         """The part that holds some cells (n, 2), by column and row, as far as they are there."""
         most = self.values.shape[::-1]
         low = np.clip(np.floor(cells.min(axis=0)), 0, most).astype(np.int64)
@@ -81,7 +80,7 @@ class Raster:
             out += np.where(weight > 0.0, weight * values, 0.0)
         return out
 
-    def coarser(self, most: int) -> Raster:
+    def coarser(self, most: int) -> Self:
         """The same with means of whole blocks of cells, so that there are at most so many; itself if there are."""
         h, w = self.values.shape
         step = int(np.ceil(np.sqrt(h * w / max(most, 1))))

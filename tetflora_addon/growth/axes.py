@@ -8,9 +8,8 @@ et al., "A quantitative analysis of plant form: the pipe model theory", 1964; p 
 Weber and Penn (SIGGRAPH 1995, section 4.4) is added over the first eighth.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,7 +29,7 @@ class Axes(Arrays):
     frames: Floats  # (n, S, 3, 3): local axes along each segment
     segments: Integers  # (n,): number of segments
     skies: Floats | None = None  # (n, S, 3): in the wind: `seeds.Branches.sky` along each segment
-    later: Axes | None = None  # the same lines a moment later, where it is asked how plants move
+    later: Self | None = None  # the same lines a moment later, where it is asked how plants move
 
     def at(self, branch: Integers, t: Floats) -> tuple[NDArray, NDArray]:
         """Positions (m, 3) and frames (m, 3, 3) at the fractions t (m,) of the axes of branches (m,)."""

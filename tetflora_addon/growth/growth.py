@@ -110,10 +110,8 @@ def chosen_drawn(rows: Table, plants: Branches, owner: Integers, index: Integers
     position, frame = begun(plant)
     # The drawing is bent when its lines are asked for.
     later = None if plant.later is None else Pose(*begun(plant.later), plant.later.sky)
-    key, size = (
-        child_key(plant.key, index + _DRAWN_PATH),
-        {"length": length * plant.scale, "radius": radius * plant.scale},
-    )
+    key = child_key(plant.key, index + _DRAWN_PATH)
+    size = {"length": length * plant.scale, "radius": radius * plant.scale}
     where = {"position": position, "frame": frame, "later": later}
     return replace(plant, row=row, key=key, vigor=vigor, outward=outward, **where, **size)
 

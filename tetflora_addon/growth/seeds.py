@@ -9,9 +9,8 @@ inventory has the crown that was measured.
 Of what has begun to grow from them there are `Branches`.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
+from typing import Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -37,12 +36,12 @@ class Seeds(Arrays):
     motion: Floats | None = None
 
     @classmethod
-    def upright(cls, number: int, species: int = 0) -> Seeds:
+    def upright(cls, number: int, species: int = 0) -> Self:
         """So many plants of a species at the origin, of scale 1, with seeds from 0 on."""
         frame, kind = np.tile(np.eye(3), (number, 1, 1)), np.full(number, species, np.int32)
         return cls(("",), kind, np.arange(number), np.zeros((number, 3)), frame, np.ones(number))
 
-    def counted_from(self, origin: Floats) -> Seeds:
+    def counted_from(self, origin: Floats) -> Self:
         """The same plants in coordinates that begin at a place (3,) of the present ones."""
         return replace(self, position=self.position - origin) if origin.any() else self
 
@@ -123,12 +122,12 @@ class Branches(Arrays):
     crown: Floats32 | None = None
 
     @classmethod
-    def apart(cls, row: int, key: NDArray, frame: NDArray, length: float, scale: float) -> Branches:
+    def apart(cls, row: int, key: NDArray, frame: NDArray, length: float, scale: float) -> Self:
         """Branches (n,) of one row at the origin, of radius 1, as long as any and each a plant of its own."""
         one, kind = np.ones(len(key)), np.full(len(key), row, np.int32)
         plant, place = np.arange(len(key), dtype=np.int32), np.zeros((len(key), 3))
         return cls(kind, plant, key, place, frame, length * one, one, scale * one, one, 0.0 * one)
 
-    def moved(self) -> Branches:
+    def moved(self) -> Self:
         """The same a moment later; only where that is known."""
         return replace(self, **vars(self.later), later=None)

@@ -183,10 +183,8 @@ def sway(rows: Table, branches: Branches, ahead: float = 0.0) -> Floats:
     rate = np.clip(rows["pace"][row] / np.maximum(np.where(drawn, branches.scale, branches.length), 1e-9), *_RATES)
     key, place = branches.key, 0.0
     if drawn.any():
-        key, place = (
-            np.where(drawn, np.uint64(0), key),
-            np.where(drawn, (branches.position + air["origin"]) @ _APART, 0.0),
-        )
+        key = np.where(drawn, np.uint64(0), key)
+        place = np.where(drawn, (branches.position + air["origin"]) @ _APART, 0.0)
     force = np.zeros((3, len(row)))
     for axis, (amplitude, quicker, draw) in enumerate(zip(_SWAY, _SWAY_RATES, _SWAY_DRAWS, strict=True)):
         force[axis] = amplitude * np.sin(2 * np.pi * _cycles(air, rate * quicker, ahead, uniform(key, draw) + place))

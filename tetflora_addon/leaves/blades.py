@@ -5,8 +5,6 @@
 Compound leaves: leaflets in pairs along a rachis, as of ash and fern, or around a point, as petals.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from functools import lru_cache
 
@@ -139,7 +137,10 @@ def _half(
         starts = np.cumsum([0, *(len(line) for _, line in lines)])
         strips = [_strip(lines[i][0], lines[i + 1][0], starts[i], starts[i + 1]) for i in range(len(lines) - 1)]
         places, faces = np.concatenate([line for _, line in lines]), np.concatenate(strips)
-        wrong = side * _signed(places[faces]) < -1e-12
+        # Signed areas (f,) of flat quads (f, 4, 2).
+        corners = places[faces]
+        one, two = corners[:, 2] - corners[:, 0], corners[:, 3] - corners[:, 1]
+        wrong = side * ((one[:, 0] * two[:, 1] - one[:, 1] * two[:, 0]) / 2.0) < -1e-12
         if not wrong.any() or key.all() or not len(columns):
             break
         # Where a face is turned over, rays lead on from its corners at the margin; from all of them if that is not it.
@@ -170,12 +171,6 @@ def _strip(inner: Floats, outer: Floats, first: int, second: int) -> Integers:
     a, b = np.cumsum(inside) - inside, np.cumsum(~inside) - ~inside  # links of either line that are done
     a, b = first + a, second + b
     return np.stack([a, b, np.where(inside, a + 1, b + 1), np.where(inside, a + 1, b + 1)], axis=1)
-
-
-def _signed(corners: Floats) -> Floats:
-    """Signed areas (f,) of flat quads (f, 4, 2)."""
-    one, two = corners[:, 2] - corners[:, 0], corners[:, 3] - corners[:, 1]
-    return (one[:, 0] * two[:, 1] - one[:, 1] * two[:, 0]) / 2.0
 
 
 def bend(blade: Blade, flat: Floats, amount: float = 1.0) -> Floats:

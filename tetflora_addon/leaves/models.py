@@ -10,8 +10,6 @@ its area. What is open, such as stalks, stays as it is. Up close spines grow fro
 closed parts.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -321,7 +319,12 @@ def rounded(model: LeafModel, times: int) -> tuple[LeafModel, float]:
     corners, uv, owner = _triangles(model, chosen)
     points, part = model.positions, np.full(len(model.positions), -1)
     part[corners] = of_face[chosen][owner, None]
-    fixed = _turns(points, corners) < _POINTED
+    # Angle (v,) of all triangles (t, 3) around vertices, radians.
+    place = points[corners]
+    ahead, behind = np.roll(place, -1, axis=1) - place, np.roll(place, 1, axis=1) - place
+    cosine = (ahead * behind).sum(axis=2)
+    sine = np.linalg.norm(np.cross(ahead, behind), axis=2)
+    fixed = np.bincount(corners.ravel(), np.arctan2(sine, cosine).ravel(), len(points)) < _POINTED
     area, middle = _areas(points, corners, part), _middles(points, part)
 
     def scaled(points: NDArray, corners: NDArray, part: NDArray) -> Floats:
@@ -393,15 +396,6 @@ def _with_faces(model: LeafModel, points: NDArray, corners: NDArray, uv: NDArray
         face_offsets=np.cumsum(np.concatenate([[0], np.full(len(corners), 3), size])).astype(np.int32),
         uv=np.concatenate([uv.reshape(-1, 2), model.uv[kept]]).astype(np.float32),
     )
-
-
-def _turns(points: Floats, corners: Integers) -> Floats:
-    """Angle (v,) of all triangles (t, 3) around vertices, radians."""
-    place = points[corners]
-    ahead, behind = np.roll(place, -1, axis=1) - place, np.roll(place, 1, axis=1) - place
-    cosine = (ahead * behind).sum(axis=2)
-    sine = np.linalg.norm(np.cross(ahead, behind), axis=2)
-    return np.bincount(corners.ravel(), np.arctan2(sine, cosine).ravel(), len(points))
 
 
 def _areas(points: NDArray, corners: NDArray, part: NDArray, count: int | None = None) -> Floats:

@@ -7,8 +7,6 @@ A blade lies flat with its base at the origin and its tip at (0, 1). Each point 
 palmate ones. Lobes and teeth only move points along their rays, which never meet: so no outline crosses itself.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -6,10 +6,9 @@ Needles on a shoot are brushes, flat sprays, bundles of two to five: fewer and b
 flat, and prisms with a bend up close.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Self
 
 import numpy as np
 
@@ -56,7 +55,7 @@ class LeafSurface:
         """One-sided areas (k,) of the variants."""
         return self._areas_of(self._area_vectors())
 
-    def widened_to(self, area: float) -> LeafSurface:
+    def widened_to(self, area: float) -> Self:
         """The surface with its variants wider or narrower along x, until each has a one-sided area.
 
         Of a face's area vector, x does not depend on widths, and y and z are in proportion to them.
@@ -79,7 +78,7 @@ class LeafSurface:
     def _areas_of(self, vectors: Floats) -> Floats:
         return (np.linalg.norm(vectors, axis=2) * np.where(self.solid, 0.25, 0.5)).sum(axis=1)
 
-    def moved(self, matrix: Floats, place: Floats) -> LeafSurface:
+    def moved(self, matrix: Floats, place: Floats) -> Self:
         """The surface with its points times a matrix (3, 3) or (k, 3, 3), whose columns are its axes, at a place."""
         points = self.positions @ np.swapaxes(matrix, -1, -2) + np.reshape(place, (-1, 1, 3))
         return replace(self, positions=points)

@@ -7,10 +7,9 @@ through to its surfaces does not reach those of a crown. Where sheets are drawn,
 tetrahedra.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -46,7 +45,7 @@ class MediumCells(Arrays):
     plane: Floats  # (n,): weight of the plane term, 0 to 1
 
     @classmethod
-    def of(cls, flora: Flora, refinement: Refinement, even: Mask | None = None) -> MediumCells:
+    def of(cls, flora: Flora, refinement: Refinement, even: Mask | None = None) -> Self:
         """All cells of a refinement, in the order of ``refinement.nodes``.
 
         Where ``even`` (n,) is set, nothing else stands for the leaves, and the cloud dims what they scatter as their
@@ -134,12 +133,12 @@ class SurfaceElements:
         return len(self.cell)
 
     @classmethod
-    def none(cls, count: int) -> SurfaceElements:
+    def none(cls, count: int) -> Self:
         """No sheets among a number of tetrahedra."""
         return cls(np.zeros((0, 4, 3)), np.zeros(0, np.int64), np.zeros(count, bool))
 
     @classmethod
-    def of(cls, corners: Floats, cell: Integers, count: int) -> SurfaceElements:
+    def of(cls, corners: Floats, cell: Integers, count: int) -> Self:
         """Sheets with corners (m, 4, 3) in meters, by tetrahedron (m,) out of ``count``.
 
         They replace the clouds of tetrahedra that have some. Those with a negative ``cell`` belong to the first.
@@ -156,7 +155,7 @@ class SurfaceElements:
         reach = np.ptp(self.corners.reshape(-1, 3), axis=0).max()
         return int(np.clip(reach / max(_ROOMY * side, 1e-9), *limits))
 
-    def thinned(self, most: int) -> tuple[SurfaceElements, Integers]:
+    def thinned(self, most: int) -> tuple[Self, Integers]:
         """At most so many sheets, larger as they are fewer, and the number (m,) of each of these among them, or −1."""
         step = -(-len(self) // most)
         if step <= 1:
@@ -170,7 +169,7 @@ class SurfaceElements:
         grown = middle + (corners - middle) * np.sqrt(len(self) / len(order))
         return SurfaceElements(grown, self.cell[order], self.replaced), number
 
-    def samples(self, clouds: MediumCells) -> tuple[Floats, Integers, Integers, KeyMeans]:
+    def samples(self, clouds: MediumCells) -> "tuple[Floats, Integers, Integers, KeyMeans]":
         """Where light from all sides is sampled.
 
         Returns

@@ -2,10 +2,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Unblocked light from lamps to points and from the sky by direction, and the buffers in which lights see a scene."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import Self
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -99,7 +98,7 @@ class World:
     parts: Floats
 
     @classmethod
-    def of(cls, radiance: Callable[[Floats], ArrayLike]) -> World:
+    def of(cls, radiance: Callable[[Floats], ArrayLike]) -> Self:
         """A sky whose radiance (m, 3) in unit directions (m, 3) is known."""
         index = np.arange(SKY_POINTS) + 0.5
         toward = spiral(1.0 - 2.0 * index / SKY_POINTS, index, GOLDEN_ANGLE)
@@ -112,7 +111,7 @@ class World:
         return cls(parts)
 
     @classmethod
-    def plain(cls, color: ArrayLike) -> World:
+    def plain(cls, color: ArrayLike) -> Self:
         """A sky of the same radiance (3,) everywhere."""
         return cls.of(lambda toward: np.asarray(color, np.float64))
 

@@ -8,11 +8,10 @@ directions; what falls is spread around the trunk, the wider the taller the plan
 their places, so the order in which plants are given does not matter.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Generator, Iterator, Sequence
 from dataclasses import dataclass
 from enum import Enum
+from typing import Self
 
 import numpy as np
 
@@ -44,7 +43,7 @@ class Canopy(Arrays):
     area: Floats  # (n,): one-sided area of the leaves, m²
     species: Integers32  # (n,)
 
-    def ordered(self) -> Canopy:
+    def ordered(self) -> Self:
         """The same plants by place, so that sums do not depend on the order in which they were given."""
         x, y, z = self.position.T
         return self.take(np.lexsort((self.area, self.species, z, y, x)))
@@ -60,7 +59,7 @@ class Sheet:
     rows: int
 
     @staticmethod
-    def over(points: Floats, cell: float = _CELL, most: int = _MOST_CELLS) -> Sheet:
+    def over(points: Floats, cell: float = _CELL, most: int = _MOST_CELLS) -> "Sheet":
         """A sheet over all points (n, 2) or more columns, with at most about so many cells."""
         low, high = points[:, :2].min(axis=0), points[:, :2].max(axis=0)
         size = np.maximum(high - low, 1e-3)

@@ -7,10 +7,9 @@ a seed gives the same arrangement in every version of Blender. Species that
 are sought are placed before those that seek them.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -80,7 +79,7 @@ class Company:
         """Plants of a species stand now at places (n, 2)."""
         self.place.setdefault(species, []).append(points)
 
-    def lonely(self, points: Floats, species: Integers32, keys: Keys, older: Company) -> Mask:
+    def lonely(self, points: Floats, species: Integers32, keys: Keys, older: Self) -> Mask:
         """Plants that have not what they seek near, (n,), when those that these need in turn are gone as well."""
         gone = np.zeros(len(points), bool)
         seeking = [(n, r) for n, r in self.rules if r.strength > 0.0]

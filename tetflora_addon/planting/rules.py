@@ -188,7 +188,11 @@ def check_rules(rules: Rules) -> None:
     SceneError
         The first that cannot be.
     """
-    _check_numbers(rules)
+    labels = {one.name: one.metadata.get("name", "Density") for one in fields(rules)}
+    for name in _NOT_NEGATIVE:
+        value = getattr(rules, name)
+        if not isfinite(value) or value < 0.0:
+            raise SceneError(f"{labels[name]} must be 0 or greater, not {value:g}")
     if not sum(max(weight, 0.0) for weight in rules.weights) > 0.0:
         raise SceneError("No species has a weight above 0; raise a weight in the species list")
     if rules.by_density and rules.density == 0.0:
@@ -219,28 +223,17 @@ def check_rules(rules: Rules) -> None:
             f"Scale must be greater than 0, not {rules.scale_min:g} to {rules.scale_max:g}; raise Min and Max Scale"
         )
     for rule in rules.companions:
-        _check_companion(rule, len(rules.weights))
-
-
-def _check_numbers(rules: Rules) -> None:
-    labels = {one.name: one.metadata.get("name", "Density") for one in fields(rules)}
-    for name in _NOT_NEGATIVE:
-        value = getattr(rules, name)
-        if not isfinite(value) or value < 0.0:
-            raise SceneError(f"{labels[name]} must be 0 or greater, not {value:g}")
-
-
-def _check_companion(rule: Companion, species: int) -> None:
-    if not (0 <= rule.species < species and 0 <= rule.other < species):
-        raise SceneError(
-            f"A companion rule refers to species {rule.species + 1} and {rule.other + 1}, but the list has {species}; "
-            "choose species from the list, or remove the rule"
-        )
-    if not -1.0 <= rule.strength <= 1.0 or not rule.distance >= 0.0:
-        raise SceneError(
-            f"A companion rule has Attraction {rule.strength:g} and Reach {rule.distance:g} m; "
-            "Attraction must be between -1 and 1, and Reach 0 or greater"
-        )
+        species = len(rules.weights)
+        if not (0 <= rule.species < species and 0 <= rule.other < species):
+            raise SceneError(
+                f"A companion rule refers to species {rule.species + 1} and {rule.other + 1}, but the list has "
+                f"{species}; choose species from the list, or remove the rule"
+            )
+        if not -1.0 <= rule.strength <= 1.0 or not rule.distance >= 0.0:
+            raise SceneError(
+                f"A companion rule has Attraction {rule.strength:g} and Reach {rule.distance:g} m; "
+                "Attraction must be between -1 and 1, and Reach 0 or greater"
+            )
 
 
 #: Distance of neighbors in crown radii: a birch forest at 3 to 4 m is closed, and light still falls between the crowns.

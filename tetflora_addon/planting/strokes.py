@@ -171,19 +171,15 @@ def thin(brush: Brush, center: Sequence[float], standing: Floats, key: Keys, dab
     of its place: so plants outside of the circle can stay too, and doing it again changes nothing.
     """
     near = np.flatnonzero(within(standing, center, reach_of(brush)))
-    near = near[np.argsort(_ranks(standing[near, :2]), kind="stable")]
+    # Numbers in [0, 1) that places (n, 2) have by themselves, in the precision in which Blender stores them.
+    bits = np.ascontiguousarray(standing[near, :2], np.float32).view(np.uint32)
+    near = near[np.argsort(uniform(child_key(key_of_seed(bits[:, 0]), bits[:, 1]), _Draw.RANK), kind="stable")]
     _, first = np.unique(cells_of(standing[near, :2], cell_size(brush.density)), return_index=True)
     winners = near[np.sort(first)]
     winners = winners[Spacing(brush.min_distance, np.zeros((0, 2))).admit(standing[winners, :2], len(winners))]
     gone = np.sort(near[~np.isin(near, winners)])
     gone = gone[within(standing[gone], center, brush.radius)]
     return gone[_drawn(brush, gone, key, dab)]
-
-
-def _ranks(places: Floats) -> Floats:
-    """Numbers in [0, 1) that places (n, 2) have by themselves, in the precision in which Blender stores them."""
-    bits = np.ascontiguousarray(places, np.float32).view(np.uint32)
-    return uniform(child_key(key_of_seed(bits[:, 0]), bits[:, 1]), _Draw.RANK)
 
 
 def individuals(brush: Brush, keys: Keys) -> dict[str, NDArray]:

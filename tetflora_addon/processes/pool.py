@@ -10,8 +10,6 @@ A process belongs to the thread that calls a function in it, and to nobody betwe
 holds the lock where it has none, writes to it or closes its pipes; anybody may kill it.
 """
 
-from __future__ import annotations
-
 import atexit
 import json
 import math
@@ -23,7 +21,7 @@ from collections.abc import Callable, Iterable, Iterator
 from contextlib import suppress
 from itertools import count
 from pathlib import Path
-from typing import TypeVar
+from typing import Self, TypeVar
 from weakref import finalize, ref
 
 from .. import parallel
@@ -188,7 +186,7 @@ class _Given:
         self.thing, self.number, self.forgotten = thing, next(_numbers), False
         self._lock, self._packed = threading.Lock(), None
 
-    def packed(self) -> tuple[Packed, list[_Given]]:
+    def packed(self) -> tuple[Packed, list[Self]]:
         """The bytes of the thing without some of its parts, and these, which have to be there before it."""
         with self._lock:
             if self._packed is None:
@@ -196,7 +194,7 @@ class _Given:
             return self._packed
 
     @staticmethod
-    def _pack(whole: object) -> tuple[Packed, list[_Given]]:
+    def _pack(whole: object) -> "tuple[Packed, list[_Given]]":
         parts: list[_Given] = []
 
         def known(thing: object) -> int | None:

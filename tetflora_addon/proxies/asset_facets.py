@@ -5,14 +5,12 @@
 Sizes, numbers and the order in which facets come and go are those of plants (`facet_sizes`, `microsurfaces`).
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import perpendicular, unit
+from ..arrays import Floats, Integers, perpendicular, unit
 from ..assets.asset import COUNTS
 from ..growth.hashing import signed, uniform
 from ..optics import recollision_albedo
@@ -34,18 +32,13 @@ def facet_totals(placed: PlacedAssets, parts: AssetParts) -> Totals:
     return replace(totals, leaf_area=totals.leaf_area + closed_leaves / 2, wood_area=totals.wood_area - closed_leaves)
 
 
-def asset_weights(placed: PlacedAssets, parts: AssetParts, number: NDArray[np.float64]) -> NDArray[np.float64]:
+def asset_weights(placed: PlacedAssets, parts: AssetParts, number: Floats) -> Floats:
     """Fraction (n,) of their area that facets of clusters (n,) get, of which there are so many (n,) each."""
     return by_number(placed.assets.clusters.weights, parts.cluster, number, COUNTS)
 
 
 def facets_of_assets(
-    placed: PlacedAssets,
-    parts: AssetParts,
-    totals: Totals,
-    leaf: NDArray[np.float64],
-    wood: NDArray[np.float64],
-    left_out: NDArray[np.float64] | None = None,
+    placed: PlacedAssets, parts: AssetParts, totals: Totals, leaf: Floats, wood: Floats, left_out: Floats | None = None
 ) -> Facets:
     """Facets of clusters (n,) with `facet_totals`, of sides for leaves and for wood (n,), meters.
 
@@ -69,11 +62,11 @@ def _placed(
     parts: AssetParts,
     part_key: NDArray[np.uint64],
     leafy: bool,
-    owner: NDArray[np.int64],
-    index: NDArray[np.int64],
+    owner: Integers,
+    index: Integers,
     key: NDArray[np.uint64],
-    side: NDArray[np.float64],
-    weight: NDArray[np.float64],
+    side: Floats,
+    weight: Floats,
 ) -> Facets:
     """Facets (m,) of clusters: each at a sample, turned about its normal as may be."""
     samples, clusters = placed.assets.samples, placed.assets.clusters

@@ -7,8 +7,6 @@ between a light and the view is noticed by the shape of its shadow, and wants fi
 refines "in order to calculate accurate shadows" (section 6.1).
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

@@ -21,18 +21,17 @@ same species is measured with all of its leaves, some, and none (`SHARES`), and 
 of a weight is nearly linear in the share of leaves that is left; between two ages it is so in their logarithm.
 """
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable, Collection, Generator, Iterator
 from dataclasses import dataclass, replace
 from functools import cache, lru_cache
 from pathlib import Path
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import GOLDEN_TURN, Floats, Integers, Mask, Table, spiral, spread
+from ..arrays import GOLDEN_TURN, Floats, Floats32, Integers, Mask, Table, spiral, spread
 from ..compiled.clumping import fingerprint
 from ..compiled.flora import Flora, compile_species
 from ..compiled.rays import PlantElements, basis, elements_of
@@ -208,7 +207,7 @@ def digest(flora: Flora, number: int) -> str:
 
 
 @cache
-def shipped() -> dict[str, NDArray[np.float32]]:
+def shipped() -> dict[str, Floats32]:
     """Weights (2, r, k) of the shipped species and their variants by `digest`."""
     try:
         table = json.loads(TABLE.read_text(encoding="utf-8"))
@@ -289,7 +288,7 @@ def _apart(flora: Flora, families: list[Branches]) -> tuple[Branches, Floats]:
 
 
 def _fitted(
-    sight: SiblingGroups, rays: float, seen: dict[object, list[tuple[View, Integers]]]
+    sight: "SiblingGroups", rays: float, seen: "dict[object, list[tuple[View, Integers]]]"
 ) -> Generator[float, None, Floats]:
     """Weights (k,) for one row; yields the fraction that is done.
 
@@ -356,7 +355,7 @@ class View:
         """Vectors (n, 3) on the plane (n, 2), in units of the lattice."""
         return vectors @ np.stack([self.u, self.v], axis=1) / self.spacing
 
-    def coarser(self, stride: int) -> View:
+    def coarser(self, stride: int) -> Self:
         """The same with each so many-th line of the lattice only."""
         return replace(self, spacing=self.spacing * stride)
 
@@ -378,12 +377,12 @@ class SiblingGroups:
     pieces: Pieces | None  # of the branches, where only these count
 
     @classmethod
-    def of_subplants(cls, flora: Flora, some: Branches, beyond: Floats) -> SiblingGroups:
+    def of_subplants(cls, flora: Flora, some: Branches, beyond: Floats) -> Self:
         """Whole sub-plants."""
         return cls(flora, some, beyond, subplant_totals(flora, some).optical_area, flora.one_leaf_area(some), None)
 
     @classmethod
-    def of_branches(cls, flora: Flora, some: Branches, beyond: Floats) -> SiblingGroups:
+    def of_branches(cls, flora: Flora, some: Branches, beyond: Floats) -> Self:
         """Branches with their own leaves only."""
         pieces, owner = open_subplants(flora, some)[2:]
         area = np.bincount(owner, piece_totals(flora, pieces).optical_area, len(some))

@@ -11,8 +11,6 @@ for Zhou, Huang, Ramamoorthi, Sen and Yan ("Appearance-Preserving Scene Aggregat
 that crowns send back as much light in all directions together as before.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

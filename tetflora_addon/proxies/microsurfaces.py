@@ -10,8 +10,6 @@ shows less to the sky than a flat one and scatters more light aside, and a spray
 in the plane of a leaf's own axes made beeches a quarter too bright from above.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import lru_cache

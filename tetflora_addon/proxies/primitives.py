@@ -9,16 +9,13 @@ faces the eye; a sphere covers the same from everywhere. A sphere can therefore 
 camera, but not for all lights as well.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ..arrays import Arrays, Floats
+from ..arrays import Arrays, Floats, Floats32
 from ..buffers import MeshBuffers, PointBuffers
 from ..camera.camera import Camera
 from .microsurfaces import CIRCUMRADIUS, SIN_60, Facets
@@ -36,27 +33,27 @@ SKYLIGHT = 0.2
 class Triangles(Arrays):
     """Equilateral triangles."""
 
-    corners: NDArray[np.float32]  # (n, 3, 3): world space, meters
-    color: NDArray[np.float32]  # (n, 3)
-    transmission: NDArray[np.float32]  # (n,)
-    velocity: NDArray[np.float32] | None = None  # (n, 3): meters a second; None for plants at rest
+    corners: Floats32  # (n, 3, 3): world space, meters
+    color: Floats32  # (n, 3)
+    transmission: Floats32  # (n,)
+    velocity: Floats32 | None = None  # (n, 3): meters a second; None for plants at rest
     #: roughness and dull, (n,): as of facets.
-    roughness: NDArray[np.float32] | None = None
-    dull: NDArray[np.float32] | None = None
+    roughness: Floats32 | None = None
+    dull: Floats32 | None = None
 
 
 @dataclass(frozen=True)
 class Spheres(Arrays):
     """Spheres."""
 
-    center: NDArray[np.float32]  # (n, 3): world space, meters
-    radius: NDArray[np.float32]  # (n,)
-    color: NDArray[np.float32]  # (n, 3)
-    transmission: NDArray[np.float32]  # (n,)
+    center: Floats32  # (n, 3): world space, meters
+    radius: Floats32  # (n,)
+    color: Floats32  # (n, 3)
+    transmission: Floats32  # (n,)
     #: velocity, roughness and dull, (n, 3) or None, (n,) float32 or None, (n,) float32: as of triangles.
-    velocity: NDArray[np.float32] | None = None
-    roughness: NDArray[np.float32] | None = None
-    dull: NDArray[np.float32] | None = None
+    velocity: Floats32 | None = None
+    roughness: Floats32 | None = None
+    dull: Floats32 | None = None
 
 
 #: Facets, or what is drawn in their place.
@@ -64,7 +61,7 @@ Primitive = Facets | Triangles | Spheres
 _Drawn = TypeVar("_Drawn", Facets, Triangles, Spheres)
 
 
-def triangle_corners(facets: Facets) -> NDArray[np.float32]:
+def triangle_corners(facets: Facets) -> Floats32:
     """Corners (n, 3, 3) of a triangle for each facet."""
     reach = CIRCUMRADIUS * facets.side[:, None]
     longer = 1.0 if facets.stretch is None else facets.stretch[:, None]
@@ -167,13 +164,13 @@ def facing(facets: Facets, camera: Camera) -> Floats:
     return np.abs(np.einsum("ni,ni->n", facets.normal, ray)) / np.maximum(np.linalg.norm(ray, axis=1), 1e-300)
 
 
-def _mirrored(drawn: Triangles | Spheres) -> dict[str, NDArray[np.float32]]:
+def _mirrored(drawn: Triangles | Spheres) -> dict[str, Floats32]:
     """Attributes of their gloss, where these differ from face to face."""
     attributes = {"tf_roughness": drawn.roughness, "tf_dull": drawn.dull}
     return {name: values for name, values in attributes.items() if values is not None}
 
 
-def _shaded(facets: Facets) -> tuple[NDArray[np.float32] | None, ...]:
+def _shaded(facets: Facets) -> tuple[Floats32 | None, ...]:
     optional = facets.velocity, facets.roughness, facets.dull
     more = (None if own is None else own.astype(np.float32) for own in optional)
     return facets.color.astype(np.float32), facets.transmission.astype(np.float32), *more

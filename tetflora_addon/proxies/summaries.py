@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Summaries of tetrahedra: optical area, color, orientation of what they hold (paper, 6.5), and extinction."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

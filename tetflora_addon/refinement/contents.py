@@ -10,11 +10,9 @@ crosses it is clipped. Nothing smaller than a pixel of the alpha buffer shows in
 by less than such a *slack* does not cross it.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from typing import Generic, TypeVar
+from typing import Generic, Self, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -145,7 +143,7 @@ class PlantParts(Arrays):
     extent: Floats  # (n,): longest side, meters
 
     @classmethod
-    def of_subplants(cls, flora: Flora, branches: Branches) -> PlantParts:
+    def of_subplants(cls, flora: Flora, branches: Branches) -> Self:
         """Whole sub-plants (n,)."""
         bound = extents(flora, branches, farthest=False)
         extent = np.maximum(2.0 * bound[:, 0], bound[:, 2] - bound[:, 1]) * branches.length
@@ -154,7 +152,7 @@ class PlantParts(Arrays):
         return cls(branches, alone, subplant_totals(flora, branches), extent)
 
     @classmethod
-    def of_branches(cls, flora: Flora, branches: Branches) -> PlantParts:
+    def of_branches(cls, flora: Flora, branches: Branches) -> Self:
         """Branches (n,) without what grows on them."""
         extent = branches.length * np.maximum(1.0, 2.0 * envelope_reach(flora.rows)[branches.row])
         return cls(branches, np.ones(len(branches), bool), piece_totals(flora, as_pieces(branches)), extent)
@@ -181,7 +179,7 @@ class InCells(Arrays, Generic[Kind]):
     totals: Totals  # of n
 
     @classmethod
-    def none(cls, kind: type[Kind]) -> InCells[Kind]:
+    def none(cls, kind: type[Kind]) -> "InCells[Kind]":
         """Nothing of a kind."""
         return cls(kind.empty(), _NONE, Totals.empty())
 

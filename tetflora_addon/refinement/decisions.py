@@ -2,10 +2,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The refinement step: what becomes of each terminal tetrahedron that holds something (paper, section 6.4)."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from enum import IntEnum
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -64,9 +63,7 @@ class Terminals(Arrays):
     fully_inside: Mask
 
     @classmethod
-    def seen(
-        cls, tree: TetrahedralTree, nodes: Integers, totals: Totals, camera: Camera, buffer: AlphaBuffer
-    ) -> Terminals:
+    def seen(cls, tree: TetrahedralTree, nodes: Integers, totals: Totals, camera: Camera, buffer: AlphaBuffer) -> Self:
         """Draw tetrahedra ``nodes`` (n,) of the tree into the alpha buffer and keep what it finds for each."""
         vertices = tree.vertices(nodes)
         outline = buffer.add(nodes, vertices, mean_extinction(totals, volume(vertices)))

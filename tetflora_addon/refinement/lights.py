@@ -9,11 +9,9 @@ something behind it that the camera sees, counts by the pixels of its shadow the
 leaves whose shadows have a shape become leaves, and the rest is divided until its shadow is small.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from typing import Literal
+from typing import Literal, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -60,7 +58,7 @@ class Light:
     ellipse: bool = False  # whether an area is a disk or an ellipse instead of a square or a rectangle
     shadow: bool = True  # whether it casts shadows; without, everything is lit
 
-    def counted_from(self, origin: Floats) -> Light:
+    def counted_from(self, origin: Floats) -> Self:
         """The same in coordinates that begin at a place (3,) of the present ones."""
         return replace(self, position=self.position - origin)
 

@@ -9,8 +9,6 @@ The root of the tree holds all that there is. One plant 1,000 km away takes twen
 anything of the size of the others, and with that what the settings allow. Outliers are left out, and named.
 """
 
-from __future__ import annotations
-
 from collections.abc import Generator, Sequence
 from dataclasses import dataclass, field, replace
 
@@ -166,7 +164,7 @@ class Refinement:
     polygons: Polygons = field(default_factory=Polygons.empty)  # all of them, whole
 
     @property
-    def nodes(self) -> NDArray[np.intp]:
+    def nodes(self) -> Integers:
         """Terminal nodes (t,) that hold something."""
         return self.cells.nodes
 
@@ -327,7 +325,7 @@ def _bounds(flora: Flora, plants: SharedPlants, assets: SharedAssets, polygons: 
 
 def _filled(
     tree: TetrahedralTree, shared: Sequence[SharedParts], cell_polygons: PolygonsByCell, changed: Mask
-) -> tuple[NDArray[np.intp], Totals]:
+) -> tuple[Integers, Totals]:
     """Nodes (n,) whose contents have changed and that hold something, and their totals."""
     found = [*(kind.totals(changed) for kind in shared), *cell_polygons.totals(changed)]
     every = sums(Totals.concatenate([t for t, _ in found]), np.concatenate([c for _, c in found]), len(tree))
@@ -340,7 +338,7 @@ def _drawn(
     buffers: Buffers,
     buffer: AlphaBuffer | None,
     cells: Terminals | None,
-    nodes: NDArray[np.intp],
+    nodes: Integers,
     totals: Totals,
 ) -> tuple[Terminals, AlphaBuffer]:
     """Terminals that are there and new ones, and the buffer into which all of them are drawn."""

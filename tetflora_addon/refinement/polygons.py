@@ -8,12 +8,11 @@ triangles of its face. Positions, texture coordinates and all other attributes o
 fragments of a face add up to it whatever the sequence of cuts.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from copy import copy
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -122,7 +121,7 @@ class Meshes:
             joined([getattr(s, k) for s in surfaces], np.zeros(0, bool)) for k in ("solid", "leaf")
         )
 
-    def counted_from(self, origin: Floats) -> Meshes:
+    def counted_from(self, origin: Floats) -> Self:
         """The same in coordinates that begin at a place (3,) of the present ones."""
         moved = copy(self)
         moved.origin = self.origin - origin
@@ -194,7 +193,7 @@ class Polygons(Arrays):
     reach: Floats  # (n,): distance from there within which all of it lies, meters
 
     @classmethod
-    def everything(cls, meshes: Meshes) -> Polygons:
+    def everything(cls, meshes: Meshes) -> Self:
         """All faces of all instances, whole."""
         instance, face = spread(np.diff(meshes.first_face)[meshes.surface])
         face += meshes.first_face[meshes.surface][instance]
@@ -208,14 +207,12 @@ class Polygons(Arrays):
         return cls(meshes, face.astype(np.int32), instance.astype(np.int32), whole, *none, center, reach)
 
     @classmethod
-    def empty(cls) -> Polygons:
+    def empty(cls) -> Self:
         """None at all."""
         return cls.everything(_NOTHING)
 
     @classmethod
-    def fragments(
-        cls, meshes: Meshes, face: NDArray, instance: NDArray, triangle: NDArray, weights: NDArray
-    ) -> Polygons:
+    def fragments(cls, meshes: Meshes, face: NDArray, instance: NDArray, triangle: NDArray, weights: NDArray) -> Self:
         """Fragments (n,) of faces, given by a triangle (n,) each and weights (n, 3, 3) in it."""
         corners = weights @ meshes.corners(triangle, instance)
         center = corners.mean(axis=1)
@@ -224,7 +221,7 @@ class Polygons(Arrays):
         numbers = (np.asarray(a, np.int32) for a in (face, instance, part, triangle))
         return cls(meshes, *numbers, weights, center, reach)
 
-    def take(self, index: NDArray | slice) -> Polygons:
+    def take(self, index: NDArray | slice) -> Self:
         """Rows by indices (k,), mask (n,) or slice; fragments go with the faces that refer to them."""
         part = self.part[index]
         cut = np.flatnonzero(part >= 0)
@@ -236,7 +233,7 @@ class Polygons(Arrays):
         return Polygons(self.meshes, *some, part, *more, self.center[index], self.reach[index])
 
     @classmethod
-    def concatenate(cls, parts: Sequence[Polygons]) -> Polygons:
+    def concatenate(cls, parts: Sequence[Self]) -> Self:
         """All of several in one; they refer to the same meshes."""
         parts = [p for p in parts if len(p)] or [cls.empty()]
         if len(parts) == 1:
@@ -273,7 +270,7 @@ class Polygons(Arrays):
         triangle[own], fraction[own] = self.triangle[rows], area_fractions(self.weights)[rows]
         return owner, triangle, fraction
 
-    def as_fragments(self) -> tuple[Integers, Polygons]:
+    def as_fragments(self) -> tuple[Integers, Self]:
         """The polygon (k,) that each fragment comes from, and fragments; whole faces become their triangles."""
         owner, triangle, _ = self.triangles()
         weights = np.broadcast_to(np.eye(3), (len(owner), 3, 3)).copy()

@@ -7,8 +7,6 @@ Pixels are counted row by row from the lower left corner, ``pixel = row · width
 along it. Nothing nearer than the near plane or beyond the far plane is seen.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 

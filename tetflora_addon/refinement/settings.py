@@ -2,10 +2,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What the user decides about refinement."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass, replace
+from typing import Self
 
 from ..parameters import script_setting, setting, within
 
@@ -78,7 +77,7 @@ class RefinementSettings:
         **within(0.0, 16.0, 1000.0),
     )
 
-    def first_look(self) -> RefinementSettings:
+    def first_look(self) -> Self:
         """Settings of a result that is there within a second or so and shows where everything is.
 
         Meant for an image of `FIRST_LOOK` pixels; coarser than these settings in every respect. Limits stay.

@@ -12,11 +12,9 @@ branch itself and the sub-plants of the next order, with points of their own. Th
 the image, so that the work is bounded by what the image shows.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from typing import Any, Generic, TypeVar
+from typing import Any, Generic, Self, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -482,11 +480,11 @@ class PlacedAssets:
         return len(self.instances)
 
     @classmethod
-    def none(cls) -> PlacedAssets:
+    def none(cls) -> Self:
         """No instances."""
         return cls(AssetTable.none(), Instances.empty())
 
-    def take(self, index: NDArray) -> PlacedAssets:
+    def take(self, index: NDArray) -> Self:
         """Some instances (k,) or a mask (n,) of them."""
         return PlacedAssets(self.assets, self.instances.take(index))
 

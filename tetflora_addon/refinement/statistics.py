@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Statistics of a refinement, for the panel, the command line and the benchmarks; time of jobs."""
 
-from __future__ import annotations
-
 import time
 from dataclasses import asdict, dataclass, field
 

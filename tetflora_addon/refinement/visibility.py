@@ -13,8 +13,6 @@ of each fragment times the pixels that the image has for a solid angle there, wh
 with one over the cosine of the latitude.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -207,7 +205,7 @@ class Buffers:
         if not self.around and occluders is not None and len(occluders):
             self.depth = occluder_depth(occluders, hiding(camera), *self.size)
 
-    def fit(self, buffer: AlphaBuffer | PanoramaBuffer | None, cells: int) -> AlphaBuffer | PanoramaBuffer:
+    def fit(self, buffer: "AlphaBuffer | PanoramaBuffer | None", cells: int) -> "AlphaBuffer | PanoramaBuffer":
         """The buffer itself if it is fine enough for a number of tetrahedra, or a finer one that is empty."""
         wanted = fitting(cells // 2 if self.around else cells, self.finest)
         if buffer is not None and max(buffer.width, buffer.height) >= wanted:

@@ -8,8 +8,6 @@ full-grown axis, numbered from where its crown begins; those of younger years, b
 closer, because shoots were shorter then.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from typing import NamedTuple

@@ -5,9 +5,8 @@
 Seeds have kinds as texts, which are compared and sorted as such.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
+from typing import Self
 
 #: Most years that a plant may be old.
 MOST_YEARS = 10_000.0
@@ -28,7 +27,7 @@ class Kind:
     look: str = ""  # what else of their objects results take over; empty for nothing
 
     @classmethod
-    def read(cls, text: str) -> Kind:
+    def read(cls, text: str) -> Self:
         """The kind that a text stands for."""
         species, skeleton, age, dead, look = (*text.split(_BREAK), *[""] * 4)[:5]
         years = float(age.removesuffix(_CROWDED) or 0.0)
@@ -40,15 +39,15 @@ class Kind:
         return _BREAK.join((self.species, self.skeleton, age, dead, self.look)).rstrip(_BREAK)
 
     @property
-    def plain(self) -> Kind:
+    def plain(self) -> Self:
         """The kind of full-grown plants."""
         return Kind(self.species, self.skeleton)
 
-    def aged(self, age: float, dead: float = 0.0, crowded: bool = False) -> Kind:
+    def aged(self, age: float, dead: float = 0.0, crowded: bool = False) -> Self:
         """The kind at an age, or so long after death at it; the same where the age is 0."""
         return replace(self, age=age, dead=dead, crowded=crowded) if age else self
 
-    def later(self, years: float) -> Kind:
+    def later(self, years: float) -> Self:
         """The kind after so many years, whatever it looks like."""
         age, dead = (self.age, self.dead + years) if self.dead > 0.0 else (self.age + years, 0.0)
         return replace(self, age=age, dead=dead, look="")

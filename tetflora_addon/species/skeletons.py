@@ -11,11 +11,10 @@ Graphs and forests are arrays: points that coincide, connected parts, trees from
 forest is an array ``parent`` of indices, -1 for roots; loops run over its depth or the logarithm of that.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
+from typing import Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -35,13 +34,13 @@ class Chains:
     cyclic: Mask  # (s,): whether the last point leads back to the first
 
     @classmethod
-    def concatenate(cls, parts: list[Chains]) -> Chains:
+    def concatenate(cls, parts: list[Self]) -> Self:
         """All splines of several in one."""
         counts = np.concatenate([np.zeros(1, np.int64), *(np.diff(p.first) for p in parts)])
         points = np.concatenate([np.zeros((0, 4)), *(p.points for p in parts)])
         return cls(points, np.cumsum(counts), np.concatenate([np.zeros(0, bool), *(p.cyclic for p in parts)]))
 
-    def without(self, splines: Integers) -> Chains:
+    def without(self, splines: Integers) -> Self:
         """The chains without some splines, given by number (k,)."""
         counts = np.diff(self.first)
         stays = np.ones(len(counts), dtype=bool)
@@ -492,7 +491,10 @@ def drawn_branches(skeleton: Skeleton) -> DrawnBranches:
     at = np.where(grown_on >= 0, np.minimum(place[before[heads]] / np.maximum(length[grown_on], 1e-300), 1.0), 0.0)
     level = generation[heads]
     order = np.minimum(level, MAX_ORDERS - 1).astype(np.int32)
-    outward = _outward(level, grown_on, at)
+    # See `DrawnBranches`, from the number of forks (b,) below each branch.
+    outward = np.where(level == 2, at, 0.0)
+    for g in range(3, int(level.max(initial=0)) + 1):
+        outward[level == g] = outward[grown_on[level == g]]
     return DrawnBranches(first, knots, along, order, grown_on.astype(np.int32), at, length, outward)
 
 
@@ -541,11 +543,3 @@ def _arc(knots: Floats, first: Integers) -> Floats:
     step[first[:-1]] = 0.0
     total = np.cumsum(step)
     return total - np.repeat(total[first[:-1]], np.diff(first))
-
-
-def _outward(level: Integers, parent: Integers, at: Floats) -> Floats:
-    """See `DrawnBranches`, from the number of forks (b,) below each branch."""
-    outward = np.where(level == 2, at, 0.0)
-    for g in range(3, int(level.max(initial=0)) + 1):
-        outward[level == g] = outward[parent[level == g]]
-    return outward

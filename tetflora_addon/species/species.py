@@ -14,9 +14,8 @@ Hopkins' law of four days a degree ("Periodical events and natural law as guides
 1918) is that of eastern North America.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
+from typing import Self
 
 import numpy as np
 
@@ -91,7 +90,7 @@ class Year:
         """That of a kind of leaves, by its index in `species.LEAF_KINDS`."""
         return (self.leaf, self.blossom)[kind]
 
-    def at_latitude(self, latitude: float) -> Year:
+    def at_latitude(self, latitude: float) -> Self:
         """The same at another latitude of the northern hemisphere, degrees."""
         north = latitude - self.latitude
         if north == 0.0:
@@ -348,7 +347,7 @@ class Species:
     exact: bool = described(False, "whether all plants are the same: ranges have their means, and seeds do not matter")
     skeleton: Skeleton | None = None  # trunk and lower orders modeled by hand; only the orders above are grown
     #: (Species, float): of what, and at how many years, this is another age; see `ages.with_age`.
-    aged: tuple[Species, float] | None = None
+    aged: tuple[Self, float] | None = None
     leafiness: float = 1.0  # leaves on a twig over those of `aged`, where it is that of a dense stand
     year: Year | None = None  # when leaves appear, turn and fall
     ages: Ages | None = None  # how it grows

@@ -12,10 +12,9 @@ How plants come: planted, or from seeds of the plants around and of the woods ou
 Plants, alive and dead, are structures of arrays; records are what a simulation says of them at several years.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from enum import IntEnum
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,8 +24,7 @@ from ..errors import TetFloraError
 from ..growth.hashing import child_key, key_of_seed, uniform
 from ..species.ecology import crown_leaves
 from .light import Crowns, LightGrid
-from .site import StandSite
-from .traits import StandTraits
+from .site import StandSite, StandTraits
 
 #: Tangent of the lean from which on a plant counts as lying.
 LYING = 20.0
@@ -58,7 +56,7 @@ class Records(Arrays):
         """Which lie (n,)."""
         return (self.lean * self.lean).sum(axis=1) >= (LYING * 0.999) ** 2
 
-    def at(self, year: float) -> Records:
+    def at(self, year: float) -> Self:
         """Plants that are there in a year, one row each: linear between two records.
 
         Before the first and after the last record of a plant it is not there.
@@ -120,7 +118,7 @@ class Plants(Arrays):
     #: x and y, (n,): meters from the corner of the site.
     x: Floats
     y: Floats
-    #: basal, height, base and radius, (n,): meters; basal diameter as `traits` has it.
+    #: basal, height, base and radius, (n,): meters; basal diameter as `site` has it.
     basal: Floats
     height: Floats
     base: Floats

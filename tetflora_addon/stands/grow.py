@@ -6,8 +6,6 @@ All random numbers are hashes of the seed, the plant and the year, and sums are 
 whatever the number of threads.
 """
 
-from __future__ import annotations
-
 from collections.abc import Generator, Sequence
 from dataclasses import dataclass, replace
 
@@ -20,8 +18,7 @@ from ..parallel import blocks, on_all_cores
 from ..parameters import script_setting, setting, within
 from .change import MOST_PLANTS, DeadPlants, Plants, Records, SeedDispersal, dying, fallen, grown, in_order, planted
 from .light import LightGrid
-from .site import StandSite
-from .traits import StandSpecies, StandTraits
+from .site import StandSite, StandSpecies, StandTraits
 
 #: Plants that are looked at together.
 _BLOCK = 1 << 15
@@ -85,7 +82,7 @@ def grow(
     return stand.finished()
 
 
-def begun(site: StandSite, species: Sequence[StandSpecies], settings: StandSettings) -> GrowingStand:
+def begun(site: StandSite, species: Sequence[StandSpecies], settings: StandSettings) -> "GrowingStand":
     """A stand at its beginning, which whoever has it steps from year to year; see `grow`."""
     _check(settings)
     return GrowingStand(site, StandTraits(species), settings)

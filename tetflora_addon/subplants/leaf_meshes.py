@@ -8,10 +8,9 @@ has finer levels, see `leaves.levels`.
 Meshes of copies of a leaf model, written straight into the arrays of the mesh.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -328,7 +327,7 @@ def _copies(model: LeafModel, step: int, number: int, transmission: float, movin
     return LeafCopies(model, number, transmission, moving, hidden_gloss(model))
 
 
-def _bearers(flora: Flora, whole: WholeBranches) -> Iterator[_LeafBearers]:
+def _bearers(flora: Flora, whole: WholeBranches) -> "Iterator[_LeafBearers]":
     """Those of branches that bear leaves, row by row."""
     row = whole.branches.row
     for one in np.unique(row[flora.rows["leaves"][row].sum(axis=1) > 0]).tolist():
@@ -360,7 +359,7 @@ class _LeafBearers:
         self.kind = int(flora.rows["leaf_kind"][row])
         self.forms = flora.forms[int(flora.rows["species"][row])][self.kind]
 
-    def parts(self, fraction: Floats, kites: Floats, planes: Floats) -> Iterator[_LeafBearers]:
+    def parts(self, fraction: Floats, kites: Floats, planes: Floats) -> Iterator[Self]:
         """The branches some of whose leaves are wanted as they are, and those with leaves as kites of both kinds."""
         none, every = np.zeros_like(kites), np.ones_like(kites)
         for step, low, high in ((0, planes, every), (_PLANES, kites, planes), (_KITE, none, kites)):
@@ -369,7 +368,7 @@ class _LeafBearers:
                 given = fraction[own], low[own], high[own]
                 yield _LeafBearers(self.flora, int(self.row[0]), self.whole.take(own), step, *given)
 
-    def levels(self, lengths: Floats) -> Iterator[_LeafBearers]:
+    def levels(self, lengths: Floats) -> Iterator[Self]:
         """The branches by the levels that some of their leaves have; kites stay what they are."""
         if self.step < 0:
             yield self

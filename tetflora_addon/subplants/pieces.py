@@ -5,8 +5,6 @@
 Pieces are straight parts of an axis with the leaves on them.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 

@@ -15,8 +15,6 @@ curve, as far as its own thickness allows, since what grows on it stands on the 
 has not at all (the curve, buttresses, collars) grows with the size in the image from nothing: nothing appears at once.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 

@@ -7,8 +7,6 @@ surface of the twig's tube, turned about its line at random: over many twigs the
 that of the tubes, whose far side is never seen.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 

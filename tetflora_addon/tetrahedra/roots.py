@@ -12,14 +12,12 @@ tetrahedra around its diagonal. Bisection of their longest edges makes tetrahedr
 Computing 16, 1995). Coordinates are sums of powers of two, so a place has the same tetrahedron from any camera.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from itertools import permutations
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from ..arrays import Floats, Integers
 from .geometry import plane_through, quality, signed_volume
@@ -49,15 +47,15 @@ class _Cut:
     """A convex piece cut in two by the plane through three points, which has ``negative`` on side 0."""
 
     through: Floats
-    negative: _Piece
-    positive: _Piece
+    negative: "_Piece"
+    positive: "_Piece"
 
 
 @dataclass(frozen=True)
 class _View:
     """A piece that is what the camera sees."""
 
-    piece: _Piece
+    piece: "_Piece"
 
 
 #: A tetrahedron (4, 3), or a piece that is cut further.
@@ -247,7 +245,7 @@ def _center(piece: _Piece) -> Floats:
 SMALLEST = 1.0
 
 
-def world_cubes(bounds: ArrayLike) -> tuple[float, NDArray[np.int64], NDArray[np.int64]]:
+def world_cubes(bounds: ArrayLike) -> tuple[float, Integers, Integers]:
     """Cubes around a scene, at most two along each axis.
 
     Parameters

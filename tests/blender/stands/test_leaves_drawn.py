@@ -12,8 +12,7 @@ from devtools.leaf_area import allometry
 from tetflora_addon.growth.hashing import key_of_seed
 from tetflora_addon.species.catalog import load_species
 from tetflora_addon.stands.change import Plants, newcomers
-from tetflora_addon.stands.site import StandSite
-from tetflora_addon.stands.traits import StandSpecies, StandTraits
+from tetflora_addon.stands.site import StandSite, StandSpecies, StandTraits
 
 
 def plants_of(traits: StandTraits) -> Plants:

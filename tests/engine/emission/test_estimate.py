@@ -15,8 +15,7 @@ from tetflora_addon.compiled.flora import compile_species
 from tetflora_addon.compiled.sizes import Crown, CrownParts, crown_of
 from tetflora_addon.emission import budget
 from tetflora_addon.emission.drawing import LIT_LEAVES, Parts, drawing, drawn_blocks
-from tetflora_addon.emission.estimate import Stand, estimate
-from tetflora_addon.emission.expansion import expanded_faces
+from tetflora_addon.emission.estimate import Stand, estimate, expanded_faces
 from tetflora_addon.emission.plants import Transition
 from tetflora_addon.jobs import run_to_end
 from tetflora_addon.proxies.facet_weights import facet_weights

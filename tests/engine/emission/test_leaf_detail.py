@@ -16,8 +16,7 @@ from tests.engine.subplants.test_leaf_meshes import check_topology
 from tetflora_addon.buffers import MeshBuffers
 from tetflora_addon.compiled.flora import Flora, compile_species
 from tetflora_addon.emission.budget import fit_to_budget
-from tetflora_addon.emission.leaf_detail import LeafDetail
-from tetflora_addon.emission.plants import Transition, expanded_blocks
+from tetflora_addon.emission.plants import LeafDetail, Transition, expanded_blocks
 from tetflora_addon.growth.growth import WholeBranches
 from tetflora_addon.leaves.levels import leaf_levels
 from tetflora_addon.refinement.settings import RefinementSettings

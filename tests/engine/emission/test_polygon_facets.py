@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tests.engine.refinement.test_polygons import SEEDS, divided, grove, placed, thicket
-from tetflora_addon.emission.faces import chosen_facets
+from tetflora_addon.emission.polygons import chosen_facets
 from tetflora_addon.refinement.polygons import Polygons
 
 

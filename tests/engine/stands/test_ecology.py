@@ -16,7 +16,7 @@ from tetflora_addon.species.ages import ages_of
 from tetflora_addon.species.catalog import load_species
 from tetflora_addon.species.schema import species_from_dict
 from tetflora_addon.species.species import Ecology
-from tetflora_addon.stands.traits import StandSpecies, StandTraits
+from tetflora_addon.stands.site import StandSpecies, StandTraits
 
 
 @pytest.mark.parametrize(

@@ -12,8 +12,7 @@ from numpy.typing import NDArray
 
 from tetflora_addon.species.catalog import load_species
 from tetflora_addon.stands.change import Plants, SeedDispersal, planted
-from tetflora_addon.stands.site import StandSite
-from tetflora_addon.stands.traits import StandSpecies, StandTraits
+from tetflora_addon.stands.site import StandSite, StandSpecies, StandTraits
 
 SIDE = 600.0
 RADIUS = 3.0

@@ -20,8 +20,7 @@ from tetflora_addon.species.species import Ecology
 from tetflora_addon.stands.change import LYING, Records, grown, planted
 from tetflora_addon.stands.grow import StandSettings, begun, grow
 from tetflora_addon.stands.light import Crowns, LightGrid
-from tetflora_addon.stands.site import StandSite
-from tetflora_addon.stands.traits import StandSpecies, StandTraits
+from tetflora_addon.stands.site import StandSite, StandSpecies, StandTraits
 
 SIDE = 40.0
 MIXED = [StandSpecies(load_species(name)) for name in ("beech", "birch")]

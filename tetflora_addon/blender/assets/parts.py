@@ -7,8 +7,6 @@ collections, nodes and particles is followed down to meshes. Its digest, of mesh
 what it shows has changed since it was compiled.
 """
 
-from __future__ import annotations
-
 import hashlib
 from collections.abc import Generator, Iterator
 from contextlib import contextmanager
@@ -19,7 +17,7 @@ from typing import Any
 import bpy
 import numpy as np
 
-from ...arrays import Floats, Integers32
+from ...arrays import Floats
 from ...assets.asset import AssetSource, AssetSurface
 from ...errors import SceneError
 from ...jobs import mapped
@@ -70,7 +68,7 @@ def attributes_of(material: bpy.types.Material | None) -> Iterator[str]:
                 waiting.append(node.node_tree)
 
 
-def _add_tree(content: hashlib._Hash, tree: bpy.types.NodeTree) -> None:
+def _add_tree(content: "hashlib._Hash", tree: bpy.types.NodeTree) -> None:
     nodes = {node.as_pointer(): i for i, node in enumerate(tree.nodes)}
     for node in tree.nodes:
         if node.type in {'FRAME', 'REROUTE'}:
@@ -100,7 +98,7 @@ def _settings(node: bpy.types.Node) -> list[str]:
 _known: dict[str, list[str]] = {}
 
 
-def _add(content: hashlib._Hash, name: str, value: Any) -> None:
+def _add(content: "hashlib._Hash", name: str, value: Any) -> None:
     if isinstance(value, bpy.types.Image):
         value = image_digest(value)
     elif isinstance(value, bpy.types.NodeTree):
@@ -359,7 +357,7 @@ def digest_of_parts(parts: list[AssetPart], depsgraph: bpy.types.Depsgraph) -> s
     return content.hexdigest()
 
 
-def _add_mesh(content: hashlib._Hash, mesh: bpy.types.Mesh, slots: Slots) -> None:
+def _add_mesh(content: "hashlib._Hash", mesh: bpy.types.Mesh, slots: Slots) -> None:
     for material in slots:
         content.update(material_digest(material).encode())
     content.update(f"{len(mesh.vertices)} {len(mesh.polygons)} {len(mesh.loops)}".encode())
@@ -454,14 +452,8 @@ def _surface_steps(
         looks = reader.prepare(mesh, slots)
     yield 0.0
     found = yield from looks.steps(faces, positions, loops, corner_verts, face)
-    return AssetSurface(
-        name=part.name, positions=positions, triangles=_vertices(loops, corner_verts), face=face, **found
-    )
-
-
-def _vertices(loops: Integers32, corner_verts: Integers32) -> Integers32:
-    """Vertices of triangles from their corners, in the same array."""
+    # Vertices of triangles from their corners, in the same array.
     for start in range(0, len(loops), _TRIANGLES):
         piece = loops[start : start + _TRIANGLES]
         piece[:] = np.take(corner_verts, piece)
-    return loops
+    return AssetSurface(name=part.name, positions=positions, triangles=loops, face=face, **found)

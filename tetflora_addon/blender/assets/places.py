@@ -7,9 +7,8 @@ A group of instances without anything of its own is opened, so that what is a tr
 many parts is taken for a tree itself. All places of an asset are computed at once, as arrays.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
+from typing import Self
 
 import bpy
 import numpy as np
@@ -61,7 +60,7 @@ class Places:
         """Number of places."""
         return len(self.keys)
 
-    def counted_from(self, origin: Floats) -> Places:
+    def counted_from(self, origin: Floats) -> Self:
         """The same in coordinates that begin at a place (3,) of the present ones."""
         if not origin.any():
             return self
@@ -160,7 +159,7 @@ def _by_variant(plants: AssetPlants, variants: list[Variant]) -> list[Places]:
     return found
 
 
-def read_scatters(objects: list[bpy.types.Object], depsgraph: bpy.types.Depsgraph) -> dict[bpy.types.Object, Scatter]:
+def read_scatters(objects: list[bpy.types.Object], depsgraph: bpy.types.Depsgraph) -> "dict[bpy.types.Object, Scatter]":
     """What each of some original objects scatters.
 
     Raises

@@ -27,6 +27,7 @@ from ..placing.population_data import (
     check_settings,
     check_species,
     check_text,
+    check_value,
     list_of,
     population_data,
     refuse_constant,
@@ -129,9 +130,18 @@ def checked(data: Any, identifier: str) -> Biome:
     check_settings('"limits"', data.get("limits", {}), TetFloraLayer, known)
     check_keys('"mask"', data.get("mask", {}), set(), set(MASK))
     check_settings('"mask"', data.get("mask", {}), TetFloraLayer, MASK)
-    if not isinstance(data.get("gives_way", True), bool):
-        raise ValueError(f'"gives_way" is {quoted(data["gives_way"])}; it must be true or false')
-    _check_ground(data.get("ground", {}))
+    check_value('"gives_way"', TetFloraLayer.bl_rna.properties["gives_way"], data.get("gives_way", True))
+    ground = data.get("ground", {})
+    check_keys('"ground"', ground, set(), set(GROUND))
+    for key, value in ground.items():
+        default, low, high = GROUND[key]
+        if isinstance(default, float):
+            _check_number(f'"ground": "{key}"', value, low, high)
+            continue
+        if not isinstance(value, list) or len(value) != 3:
+            raise ValueError(f'"ground": "{key}" is {quoted(value)}; it must be three numbers')
+        for part in value:
+            _check_number(f'"ground": "{key}"', part, low, high)
     season = data.get("season", {})
     check_keys('"season"', season, set(), set(SEASON))
     for key, value in season.items():
@@ -200,19 +210,6 @@ def layers_of(scene: bpy.types.Scene, uid: str) -> list[bpy.types.PropertyGroup]
 def stands_of(scene: bpy.types.Scene, uid: str) -> list[bpy.types.Object]:
     """Fields of a biome that are stands."""
     return [obj for obj in scene.objects if is_stand(obj) and obj.tetflora.stand.biome == uid]
-
-
-def _check_ground(ground: Any) -> None:
-    check_keys('"ground"', ground, set(), set(GROUND))
-    for key, value in ground.items():
-        default, low, high = GROUND[key]
-        if isinstance(default, float):
-            _check_number(f'"ground": "{key}"', value, low, high)
-            continue
-        if not isinstance(value, list) or len(value) != 3:
-            raise ValueError(f'"ground": "{key}" is {quoted(value)}; it must be three numbers')
-        for part in value:
-            _check_number(f'"ground": "{key}"', part, low, high)
 
 
 def _check_number(where: str, value: Any, low: float, high: float) -> None:

@@ -17,8 +17,7 @@ from ...assets import asset_cache
 from ...assets.asset import Asset, AssetSource, AssetTable, Instances
 from ...assets.compiled import compile_steps
 from ...camera.camera import Camera
-from ...emission.asset_costs import AssetCosts
-from ...emission.asset_plan import OriginalPolicy
+from ...emission.asset_plan import AssetCosts, OriginalPolicy
 from ...errors import SceneError, TetFloraError
 from ...jobs import Job, Progress, mapped, run_to_end
 from ...refinement.shared_parts import PlacedAssets

@@ -2,10 +2,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Input of refinement from a scene: plants, meshes, lights, compiled species and settings."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields, replace
+from typing import Self
 
 import bpy
 import numpy as np
@@ -15,7 +14,7 @@ from ...arrays import Floats
 from ...camera.camera import Camera
 from ...compiled.flora import Flora, compile_species
 from ...emission.budget import BYTES_PER_TRIANGLE
-from ...emission.expansion import expanded_faces
+from ...emission.estimate import expanded_faces
 from ...emission.light import Sources
 from ...errors import SceneError
 from ...growth.growth import trunks
@@ -78,7 +77,7 @@ class SceneContents:
         """All explicit polygons."""
         return None if self.explicit is None else Polygons.everything(self.explicit.meshes)
 
-    def counted_from(self, origin: np.ndarray) -> SceneContents:
+    def counted_from(self, origin: np.ndarray) -> Self:
         """The same in coordinates that begin at a place (3,) in the world, as those of the camera (`Camera.local`)."""
         if not origin.any():
             return self

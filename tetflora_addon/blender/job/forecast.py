@@ -16,7 +16,6 @@ from numpy.typing import NDArray
 from ... import memory
 from ...arrays import Floats, Integers
 from ...compiled.recorded_sizes import ages_of_heights
-from ...compiled.sizes import Crown
 from ...emission.estimate import Estimate, Stand, estimate
 from ...errors import SpeciesError, TetFloraError
 from ...growth.seasons import PRESENT, expected_of
@@ -155,7 +154,13 @@ def _count(scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer) -> Stand | N
     index = {kind: i for i, kind in enumerate(crowns)}
     rows = [(*sizes, np.array([index[kind] for kind in species], dtype=np.int64)) for *sizes, species in parts]
     left = [replace(c, parts=c.parts.with_leaves(_in_leaf(scene, identifier))) for identifier, c in crowns.items()]
-    return _merged(rows, tuple(left))
+    # Samples of all parts as one, of each by the root of its number: a few trees show more than much grass.
+    found: list[tuple] = [(np.zeros(0), np.zeros((0, 3)), np.zeros(0), np.zeros(0, np.int64))]
+    whole = sum(np.sqrt(number) for number, *_ in rows)
+    for number, *values in rows:
+        chosen = _some(len(values[0]), max(round(_LOOKED_AT * np.sqrt(number) / whole), 1))
+        found.append((np.full(len(chosen), number / len(chosen)), *(one[chosen] for one in values)))
+    return Stand(*map(np.concatenate, zip(*found, strict=True)), tuple(left))
 
 
 def _in_leaf(scene: bpy.types.Scene, kind: str) -> float:
@@ -169,16 +174,6 @@ def _in_leaf(scene: bpy.types.Scene, kind: str) -> float:
         return 1.0
     leaf = year.at_latitude(abs(season.latitude)).leaf
     return float(expected_of(leaf, np.array([season.northern_day]), PRESENT)[0])
-
-
-def _merged(rows: list[tuple[int, Floats, Floats, Integers]], crowns: tuple[Crown, ...]) -> Stand:
-    """Samples of all parts as one, of each by the root of its number: a few trees show more than much grass."""
-    found: list[tuple] = [(np.zeros(0), np.zeros((0, 3)), np.zeros(0), np.zeros(0, np.int64))]
-    whole = sum(np.sqrt(number) for number, *_ in rows)
-    for number, *values in rows:
-        chosen = _some(len(values[0]), max(round(_LOOKED_AT * np.sqrt(number) / whole), 1))
-        found.append((np.full(len(chosen), number / len(chosen)), *(one[chosen] for one in values)))
-    return Stand(*map(np.concatenate, zip(*found, strict=True)), crowns)
 
 
 def _some(number: int, most: int = _LOOKED_AT) -> Integers:

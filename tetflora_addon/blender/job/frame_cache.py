@@ -6,8 +6,6 @@ A frame with the digest of an earlier one gets its results back; the least recen
 full. The camera counts by its cell (`camera.view_cells`), so that neighboring frames have the same digest.
 """
 
-from __future__ import annotations
-
 import hashlib
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, fields, is_dataclass, replace
@@ -136,7 +134,7 @@ def _digest_of_species(species: Species) -> str:
     return _of_species[id(species)][1]
 
 
-def add_to_digest(content: hashlib._Hash, value: object) -> None:
+def add_to_digest(content: "hashlib._Hash", value: object) -> None:
     """Add a number, text or array to a digest, or a sequence, mapping or dataclass of these."""
     if isinstance(value, np.ndarray):
         content.update(f"{value.dtype}{value.shape}".encode())

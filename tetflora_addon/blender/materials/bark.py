@@ -8,8 +8,6 @@ from the branch's girth at its base, one number for each branch. How thick the b
 the slope of u along the surface, which Bump nodes know.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass, fields
 from math import tau
@@ -76,7 +74,7 @@ class Bark:
     """One character of bark."""
 
     #: (graph, place) → (factors of the color, height in widths of a feature): terms
-    pattern: Callable[[Graph, Place], tuple[Term, Term]]
+    pattern: "Callable[[Graph, Place], tuple[Term, Term]]"
     scale: float  # features to a radius, on a branch of .25 m radius; 2π times as many around it
     stretch: float  # how much longer along the branch than around it features are
     mean: tuple[float, float, float]  # (3,): mean of the pattern's factors over the surface, measured

@@ -7,8 +7,6 @@ nodes are evaluated (`node_values`), and images are means over a piece as large 
 same texture coordinates, as those of a leaf that was copied thousands of times, are evaluated once.
 """
 
-from __future__ import annotations
-
 from collections.abc import Generator, Iterable
 from dataclasses import dataclass, field
 from functools import cache
@@ -220,7 +218,7 @@ class Plan:
 
     name: str  # of the material, for messages
     layers: MeshLayers
-    reader: FaceReader
+    reader: "FaceReader"
     viewport: Floats32  # (3,): the material's color in viewports, for images that are missing
     #: (5,): Cover, color times cover, and the lightness of what goes through; of where all has its mean, if it varies
     constant: Floats32
@@ -453,7 +451,7 @@ class FaceReader:
             self._pyramids[key] = pyramid_of(image, weighted, self._most)
         return self._pyramids[key]
 
-    def prepare(self, mesh: bpy.types.Mesh, materials: list[bpy.types.Material | None]) -> MeshLooks:
+    def prepare(self, mesh: bpy.types.Mesh, materials: list[bpy.types.Material | None]) -> "MeshLooks":
         """Read all that the looks of a mesh follow from, so that it need not be there any more afterward."""
         made = MeshLooks(mesh, materials, self)
         self.warn(problem for plan in made.plans for problem in plan.problems)

@@ -383,7 +383,11 @@ def _paths(graph: Graph, geometry: dict[str, Term]) -> dict[str, _Path]:
     whole = graph.math('MINIMUM', graph.math('MINIMUM', *exits[:2]), graph.math('MINIMUM', *exits[2:]))
     # Where nothing was hit but by rounding, no length is better than an endless one.
     whole = whole * (whole < _NEVER)
-    extinction = _extinction(graph, incoming)
+    # κ(ω) = √(ωᵀSω), 1/m (SGGX; Heitz et al. 2015).
+    x, y, z = graph.parts(incoming)
+    diagonal = graph.vector('DOT_PRODUCT', graph.attribute("tf_s0", "Vector"), incoming * incoming)
+    mixed = graph.vector('DOT_PRODUCT', graph.attribute("tf_s1", "Vector"), graph.xyz(x * y, x * z, y * z))
+    extinction = graph.math('SQRT', graph.math('MAXIMUM', mixed * 2.0 + diagonal, 0.0))
     entering = 1.0 - leaving
     paths = {}
     # Cycles's ray begins at the eye, or at what scattered it; passing through shells does not end it.
@@ -403,14 +407,6 @@ def _eye_distance(graph: Graph, incoming: Term) -> Term:
     toward = graph.node("ShaderNodeVectorTransform", {"Vector": camera["View Vector"]}, **ways)
     distance = abs(graph.vector('DOT_PRODUCT', toward, incoming)) * camera["View Distance"]
     return graph.outputs("ShaderNodeLightPath")["Is Shadow Ray"] * _NEVER + distance
-
-
-def _extinction(graph: Graph, incoming: Term) -> Term:
-    """κ(ω) = √(ωᵀSω), 1/m (SGGX; Heitz et al. 2015)."""
-    x, y, z = graph.parts(incoming)
-    diagonal = graph.vector('DOT_PRODUCT', graph.attribute("tf_s0", "Vector"), incoming * incoming)
-    mixed = graph.vector('DOT_PRODUCT', graph.attribute("tf_s1", "Vector"), graph.xyz(x * y, x * z, y * z))
-    return graph.math('SQRT', graph.math('MAXIMUM', mixed * 2.0 + diagonal, 0.0))
 
 
 def _end_weights(graph: Graph, depth: Term) -> tuple[Term, Term]:

@@ -14,12 +14,11 @@ from typing import Any, NamedTuple
 import bpy
 import numpy as np
 from mathutils import Euler
-from numpy.typing import NDArray
 
 from ...arrays import Floats32
 from .nodes import SNOW, find_socket
 
-Values = NDArray[np.float32]
+Values = Floats32
 _LUMINANCE = np.array([0.2126, 0.7152, 0.0722], np.float32)
 
 

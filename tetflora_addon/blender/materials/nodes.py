@@ -2,10 +2,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Shorthand for node trees built by code, and the mark on datablocks that TetFlora made."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Sequence
-from typing import Any, TypeVar
+from functools import partialmethod
+from typing import Any, Self, TypeVar
 
 import bpy
 
@@ -94,7 +93,7 @@ class Term:
     A product of numbers waits for what is added to it: both together are one node.
     """
 
-    def __init__(self, graph: Graph, socket: bpy.types.NodeSocket | None, factors: tuple[Any, ...] = ()) -> None:
+    def __init__(self, graph: "Graph", socket: bpy.types.NodeSocket | None, factors: tuple[Any, ...] = ()) -> None:
         self._graph, self._socket, self._factors = graph, socket, factors
 
     @property
@@ -109,17 +108,18 @@ class Term:
         """Whether it is a vector or a color."""
         return self._socket is not None and self._socket.type != 'VALUE'
 
-    def _with(self, operation: str, *values: Any) -> Term:
+    def _with(self, operation: str, *others: Any, turned: bool = False) -> Self:
+        values = (*others, self) if turned else (self, *others)
         vectors = any(isinstance(v, tuple) or (isinstance(v, Term) and v.is_vector) for v in values)
         return (self._graph.vector if vectors else self._graph.math)(operation, *values)
 
-    def __add__(self, other: Any) -> Term:
+    def __add__(self, other: Any) -> Self:
         for product, rest in ((self, other), (other, self)):
             if isinstance(product, Term) and product._socket is None:
                 return self._graph.math('MULTIPLY_ADD', *product._factors, rest)
-        return self._with('ADD', self, other)
+        return self._with('ADD', other)
 
-    def __mul__(self, other: Any) -> Term:
+    def __mul__(self, other: Any) -> Self:
         vectors = [isinstance(v, tuple) or (isinstance(v, Term) and v.is_vector) for v in (self, other)]
         if not any(vectors):
             return Term(self._graph, None, (self, other))
@@ -128,32 +128,13 @@ class Term:
 
     __radd__, __rmul__ = __add__, __mul__
 
-    def __sub__(self, other: Any) -> Term:
-        return self._with('SUBTRACT', self, other)
+    __sub__, __rsub__ = partialmethod(_with, 'SUBTRACT'), partialmethod(_with, 'SUBTRACT', turned=True)
+    __truediv__, __rtruediv__ = partialmethod(_with, 'DIVIDE'), partialmethod(_with, 'DIVIDE', turned=True)
+    __pow__, __abs__ = partialmethod(_with, 'POWER'), partialmethod(_with, 'ABSOLUTE')
+    __lt__, __gt__ = partialmethod(_with, 'LESS_THAN'), partialmethod(_with, 'GREATER_THAN')
 
-    def __rsub__(self, other: Any) -> Term:
-        return self._with('SUBTRACT', other, self)
-
-    def __truediv__(self, other: Any) -> Term:
-        return self._with('DIVIDE', self, other)
-
-    def __rtruediv__(self, other: Any) -> Term:
-        return self._with('DIVIDE', other, self)
-
-    def __pow__(self, other: Any) -> Term:
-        return self._with('POWER', self, other)
-
-    def __neg__(self) -> Term:
+    def __neg__(self) -> Self:
         return self * -1.0
-
-    def __abs__(self) -> Term:
-        return self._with('ABSOLUTE', self)
-
-    def __lt__(self, other: Any) -> Term:
-        return self._with('LESS_THAN', self, other)
-
-    def __gt__(self, other: Any) -> Term:
-        return self._with('GREATER_THAN', self, other)
 
 
 class Graph:
@@ -206,7 +187,7 @@ class Graph:
         version: int,
         given: dict[str, Term],
         outputs: Sequence[tuple[str, str]],
-        build: Callable[[Graph, dict[str, Term]], dict[str, Any]],
+        build: Callable[[Self, dict[str, Term]], dict[str, Any]],
     ) -> dict[str, Term]:
         """Outputs of a `node_group` that is fed with terms.
 

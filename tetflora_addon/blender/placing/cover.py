@@ -311,7 +311,14 @@ def strew_steps(data: JobData, population: bpy.types.PropertyGroup) -> Job[Place
     population = _again(data, population, uid)
     with restored(scene):
         canopy, above = canopy_of(scene, depsgraph)
-        parts = _fallen_leaves(scene, canopy, above)
+        # Fallen leaves of each species: as many patches as have the area of what falls.
+        parts = []
+        for name in _shedders(canopy, above):
+            patch = fallen_from(scene, name, KIND)
+            share = shed_share(species_for(scene, name)) if patch else 0.0
+            area = crown_for(scene, patch).leaves if share > 0.0 else 0.0
+            if area > 0.0:
+                parts.append(Ingredient(patch, 'FALLEN', FULL * share / (area * _SQUARE), name))
         if not parts:
             return None
         found = cover_of(scene, uid, fallen=True) or _add_cover(scene, population, grounds, {}, FALLEN_LEAVES)
@@ -319,18 +326,6 @@ def strew_steps(data: JobData, population: bpy.types.PropertyGroup) -> Job[Place
         _mix(found, parts, canopy.area.sum() / FULL / len(parts))
         with closing(make_plants_steps(scene, depsgraph, found)) as steps:
             return (yield from steps)
-
-
-def _fallen_leaves(scene: bpy.types.Scene, canopy: Canopy, above: tuple[str, ...]) -> list[Ingredient]:
-    """Fallen leaves of each species: as many patches as have the area of what falls."""
-    parts = []
-    for name in _shedders(canopy, above):
-        patch = fallen_from(scene, name, KIND)
-        share = shed_share(species_for(scene, name)) if patch else 0.0
-        area = crown_for(scene, patch).leaves if share > 0.0 else 0.0
-        if area > 0.0:
-            parts.append(Ingredient(patch, 'FALLEN', FULL * share / (area * _SQUARE), name))
-    return parts
 
 
 def cover_with_snow(scene: bpy.types.Scene, population: bpy.types.PropertyGroup) -> list[str]:

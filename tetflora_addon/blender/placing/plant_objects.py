@@ -112,7 +112,13 @@ def add_plants_steps(
     list of bpy.types.Object
         In the placement's order.
     """
-    rows = (placement.position, _eulers(placement), placement.scale, placement.species, placement.seed)
+    # XYZ Euler angles, (n, 3); upright plants turn about the vertical only.
+    angles = np.zeros((len(placement), 3))
+    angles[:, 2] = placement.azimuth
+    tilted = np.flatnonzero(placement.up[:, 2] < 1.0)
+    if len(tilted):
+        angles[tilted] = [Quaternion(q).to_euler() for q in placement.rotation[tilted].tolist()]
+    rows = (placement.position, angles, placement.scale, placement.species, placement.seed)
     return _empties_steps(scene, rows, species, [None] * len(species), collection, ages)
 
 
@@ -172,16 +178,6 @@ def _set_at_once(objects: Sequence[bpy.types.Object], rows: Sequence[np.ndarray]
         within.objects.foreach_set(name, np.ascontiguousarray(values, dtype=np.float32).reshape(-1))
     within.objects.foreach_set("empty_display_type", np.full(len(objects), arrow, np.int32))
     bpy.data.collections.remove(within)
-
-
-def _eulers(placement: Placement) -> np.ndarray:
-    """XYZ Euler angles, (n, 3); upright plants turn about the vertical only."""
-    angles = np.zeros((len(placement), 3))
-    angles[:, 2] = placement.azimuth
-    tilted = np.flatnonzero(placement.up[:, 2] < 1.0)
-    if len(tilted):
-        angles[tilted] = [Quaternion(q).to_euler() for q in placement.rotation[tilted].tolist()]
-    return angles
 
 
 def _numbered(names: Sequence[str], kinds: np.ndarray) -> list[str]:

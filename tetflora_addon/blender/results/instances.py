@@ -70,9 +70,8 @@ def add_instances(
     bpy.types.Object
         In the result collection.
     """
-    kind = 'COLLECTION' if isinstance(source, bpy.types.Collection) else 'OBJECT'
     name = results.name_for(name)
-    made = _instancer(name, kind, source, matrices, ids)
+    made = _instancer(name, source, matrices, ids)
     look_like(made, like, results.owners.get(like))
     return results.add_object(name, made, KIND_WHOLE, [source])
 
@@ -104,7 +103,7 @@ def add_cluster_instances(
     place = np.zeros(len(objects), np.int32)
     place[order] = np.arange(len(objects), dtype=np.int32)
     name = results.name_for(name)
-    made = _instancer(name, 'CHILDREN', collection, matrices, ids, place[pick])
+    made = _instancer(name, collection, matrices, ids, place[pick])
     look_like(made, like, results.owners.get(like))
     return results.add_object(name, made, KIND_CLUSTERS, [collection])
 
@@ -166,22 +165,18 @@ def _nested(results: Results, name: str, geometry: bpy.types.GeometrySet) -> lis
     for inner, rows in references_of(geometry):
         known = isinstance(inner, bpy.types.Object | bpy.types.Collection)
         source = inner.original if known else _carrier(results, name, inner)
-        kind = 'COLLECTION' if isinstance(source, bpy.types.Collection) else 'OBJECT'
         own = results.name_for(f"{name} {len(made) + 1}")
-        made.append(_instancer(own, kind, source, rows.columns.transpose(0, 2, 1), rows.number.astype(np.int32)))
+        made.append(_instancer(own, source, rows.columns.transpose(0, 2, 1), rows.number.astype(np.int32)))
         results.hold(made[-1], own)
     return made
 
 
 def _instancer(
-    name: str,
-    kind: str,
-    source: Source,
-    matrices: NDArray[np.floating],
-    ids: Integers32,
-    pick: Integers32 | None = None,
+    name: str, source: Source, matrices: NDArray[np.floating], ids: Integers32, pick: Integers32 | None = None
 ) -> bpy.types.Object:
-    """An object in no collection whose nodes show instances of a source."""
+    """An object in no collection whose nodes show instances of a source, or of objects picked from a collection."""
+    kind = 'COLLECTION' if isinstance(source, bpy.types.Collection) else 'OBJECT'
+    kind = kind if pick is None else 'CHILDREN'
     mesh = bpy.data.meshes.new(name)
     mesh.vertices.add(len(matrices))
     columns = np.ascontiguousarray(matrices.transpose(0, 2, 1), np.float32)  # as Blender stores them
@@ -294,7 +289,16 @@ def add_stand_in(
         for switch in _TURNED_OFF:
             if getattr(made.tetflora, switch, False):
                 setattr(made.tetflora, switch, False)
-        _drop_instances(made)
+        made.instance_type = 'NONE'
+        for modifier in list(made.modifiers):
+            if modifier.type == 'PARTICLE_SYSTEM' and modifier.particle_system.settings.render_type in _INSTANCED:
+                made.modifiers.remove(modifier)
+        nodes = [n for n, modifier in enumerate(made.modifiers) if modifier.type == 'NODES']
+        if nodes:
+            modifier = made.modifiers.new("Without Instances", 'NODES')
+            modifier.node_group = _bare_group()
+            # Not at the end: adaptive subdivision has to be the last one.
+            made.modifiers.move(len(made.modifiers) - 1, nodes[-1] + 1)
     look_like(made, original, results.owners.get(original))
     return results.add_object(name, made, STAND_IN, placed=True)
 
@@ -334,19 +338,6 @@ def _is_simulated(original: bpy.types.Object) -> bool:
                 groups.add(inner)
                 waiting.append(inner)
     return any(modifier.type in _SIMULATED for modifier in original.modifiers)
-
-
-def _drop_instances(made: bpy.types.Object) -> None:
-    made.instance_type = 'NONE'
-    for modifier in list(made.modifiers):
-        if modifier.type == 'PARTICLE_SYSTEM' and modifier.particle_system.settings.render_type in _INSTANCED:
-            made.modifiers.remove(modifier)
-    nodes = [n for n, modifier in enumerate(made.modifiers) if modifier.type == 'NODES']
-    if nodes:
-        modifier = made.modifiers.new("Without Instances", 'NODES')
-        modifier.node_group = _bare_group()
-        # Not at the end: adaptive subdivision has to be the last one.
-        made.modifiers.move(len(made.modifiers) - 1, nodes[-1] + 1)
 
 
 def _bare_group() -> bpy.types.NodeTree:

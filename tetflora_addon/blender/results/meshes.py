@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from ...arrays import Floats, Floats32, Integers, Integers32, Mask, linear_of, spread
 from ...buffers import MeshBuffers, PointBuffers
 from ...jobs import run_to_end
-from ..attributes import KINDS, face_offsets, members, read, type_for, values_of, write
+from ..attributes import KINDS, empty, face_offsets, members, read, type_for, values_of, write
 from ..compat import can_resize_point_clouds
 from ..materials.nodes import Graph, Term, node_group
 from ..runtime import is_there
@@ -368,9 +368,7 @@ class _Piece:
         """Values of an attribute of the surface on a domain, as of a type; 0 for None."""
         index = {"POINT": self.vertex, "CORNER": self.corner, "FACE": self.face}
         if layer is None:
-            kind = KINDS[data_type]
-            size = len(index[domain])
-            return np.zeros(size if kind.width == 1 else (size, kind.width), kind.dtype)
+            return empty(KINDS[data_type], len(index[domain]))
         if layer.domain == domain:
             found = layer.values[index[domain]]
         elif layer.domain == 'POINT':

@@ -7,8 +7,8 @@ from dataclasses import replace
 
 import bpy
 import numpy as np
-from numpy.typing import NDArray
 
+from ...arrays import Floats
 from ...camera.camera import Camera
 from ...errors import SceneError
 from ..attributes import frames_of, world_matrix
@@ -111,9 +111,7 @@ def _region(
     return (*across, *up), last_x - first_x, last_y - first_y
 
 
-def _placed(
-    camera: Camera, matrix: NDArray[np.float64], window: tuple[float, float, float, float] | None = None
-) -> Camera | None:
+def _placed(camera: Camera, matrix: Floats, window: tuple[float, float, float, float] | None = None) -> Camera | None:
     """The camera at the place of a matrix; None if that is invalid."""
     frame, _, sound = frames_of(matrix[None, :3, :3])
     if not (sound[0] and np.isfinite(matrix).all()):
@@ -153,7 +151,7 @@ def _panorama(data: bpy.types.Camera, width: int, height: int) -> tuple[tuple[fl
     return (-math.pi, math.pi, -math.pi / 2.0, math.pi / 2.0), 2 * pixels, pixels
 
 
-def _lens(data: bpy.types.Camera, matrix: NDArray[np.float64], depsgraph: bpy.types.Depsgraph) -> tuple[float, float]:
+def _lens(data: bpy.types.Camera, matrix: Floats, depsgraph: bpy.types.Depsgraph) -> tuple[float, float]:
     """Radius of the aperture and distance of focus, meters; a radius of 0 without depth of field.
 
     The lens's diameter is its focal length over the f-stop; Cycles takes 1 m for the focal length of an orthographic
@@ -281,9 +279,7 @@ def view_camera(scene: bpy.types.Scene) -> Camera | None:
     return camera_of(view, projection, (space.clip_start, space.clip_end), (region.width, region.height))
 
 
-def camera_of(
-    view: NDArray[np.float64], projection: NDArray[np.float64], clip: tuple[float, float], size: tuple[int, int]
-) -> Camera:
+def camera_of(view: Floats, projection: Floats, clip: tuple[float, float], size: tuple[int, int]) -> Camera:
     """The camera of the matrices that OpenGL draws with.
 
     Parameters

@@ -6,12 +6,11 @@ Plants whose species is an asset do not grow and are read apart, with all of the
 `objects` loop over plants, and only over those that are objects.
 """
 
-from __future__ import annotations
-
 from collections.abc import Container
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import partial
+from typing import Self
 
 import bpy
 import numpy as np
@@ -109,7 +108,7 @@ class Source:
     #: The field whose own points they are; None of instances and single plants.
     field: bpy.types.Object | None = None
 
-    def without(self, species: Container[str]) -> Source:
+    def without(self, species: Container[str]) -> Self:
         """The same without plants of some species."""
         return replace(self, part=_grown(self.part, species))
 

@@ -21,8 +21,7 @@ from ...planting.wetness import HeightGrid, cell_for, height_grid, wet_ground
 from ...species.species import Species
 from ...stands.change import Records
 from ...stands.grow import StandSettings, grow
-from ...stands.site import StandSite
-from ...stands.traits import StandSpecies
+from ...stands.site import StandSite, StandSpecies
 from ..attributes import write
 from ..placing.plant_objects import link_field
 from ..placing.rules import digest, zone_values, zoned
