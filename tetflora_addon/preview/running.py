@@ -17,7 +17,7 @@ from ..growth.hashing import key_of_seed, uniform
 from ..growth.seeds import Seeds
 
 #: Plants that are shown at most.
-MOST = 4_000
+MOST = 3_000
 #: Crowns that lie behind each other in a view: of so many, all random, hardly anything is seen through.
 LAYERS = 3.0
 #: Parts of a view in which layers are counted, across and down. Who fills one always stays.

@@ -277,7 +277,7 @@ def follow(
     preview.shapes = replace(joined(parts) if parts[1:] else parts[0], of=of_all) if parts else None
     preview.moment = _moment(scene)
     preview.made += 1
-    redraw()
+    redraw(sidebars=False)
 
 
 def _moment(scene: bpy.types.Scene) -> tuple:
