@@ -5,7 +5,7 @@
 Needs ``BLENDER=/path/to/blender``, and a screen is made for it. One file with two lives, as devtools/window_pictures:
 devtools/window_driver.py loads it again inside Blender for `steps`. Graphics are software. Seconds are the processor's,
 of all threads together, because others may use the machine too: at rest none of them is longer. An empty window alone
-takes 0.4 s to draw so, which is Blender's: frames a second are those of what plants add to it.
+takes 0.3 s to draw so, which is Blender's: frames a second are those of what plants add to it while the timeline plays.
 """
 
 from __future__ import annotations
@@ -16,7 +16,6 @@ import sys
 import tempfile
 import time
 from collections.abc import Callable, Iterator
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -28,7 +27,7 @@ from devtools import session, window  # noqa: E402  (found only now)
 PLANTS, SCRUBBED = 1_000_000, 100_000
 SPECIES = ("birch", "spruce", "oak", "beech", "scots_pine")
 ROOM = 9.0  # square meters for each plant
-FRAMES = 12  # that are timed; those before them compile species
+FRAMES, LAST = 16, 48  # that are timed, and how many there are
 
 TARGETS = {
     "show_s": {"max": 1.0},
@@ -48,7 +47,7 @@ def run(_quick: bool) -> dict[str, float]:
 
 
 def steps(ui: Any) -> Iterator[float | None]:
-    """Inside Blender: show many plants, then fewer of them in other seasons, years and years of a stand."""
+    """Inside Blender: play nothing, show many plants, then play seasons and years of fewer."""
     import bpy
 
     session.start()
@@ -79,6 +78,9 @@ def steps(ui: Any) -> Iterator[float | None]:
     yield 1.0
     draw()
     found["empty_draw_s"] = still()
+    scene.frame_start, scene.frame_end, scene.render.fps = 1, LAST, 60
+    found["empty_frame_s"] = yield from _a_frame(ui)
+    _play(ui)
     field = _wood(PLANTS)
     yield 1.0
     draw()
@@ -93,27 +95,67 @@ def steps(ui: Any) -> Iterator[float | None]:
     found["shown"] = state.find(scene).shapes.plants
     yield from ui.picture("million")
     bpy.data.objects.remove(field)
+    yield from _played(ui, found)
+    session.stop()
+
+
+def _played(ui: Any, found: dict[str, float]) -> Iterator[float | None]:
+    """Play seasons and years of a wood."""
+    import bpy
+
+    from tetflora_addon.blender.viewport import levels, state
+
+    scene = bpy.context.scene
+
+    def resting() -> bool:
+        return state.find(scene).shapes.plants == SCRUBBED
+
     _wood(SCRUBBED)
     year = scene.tetflora.year
     year.enabled = True
     for name, first, last in (("day", 60.0, 330.0), ("years", 1.0, 80.0)):
-        for frame, value in ((1, first), (4 * FRAMES, last)):
+        for frame, value in ((1, first), (LAST, last)):
             setattr(year, name, value)
             year.keyframe_insert(name, frame=frame)
-        for frame in range(1, 4 * FRAMES):
+        for frame in range(LAST, 0, -1):  # species are compiled
             scene.frame_set(frame)
-            show()
-        made = state.find(scene).made
-        seconds = [timed(partial(scene.frame_set, 2 + 4 * n)) for n in range(FRAMES)]
-        if state.find(scene).made != made + FRAMES:
-            raise RuntimeError("plants did not follow the timeline frame by frame")
-        found[f"{name}_s"] = statistics.median(seconds)
-        found[f"{name}_read_s"] = state.find(scene).seconds
+            levels.read_shapes(scene, bpy.context.evaluated_depsgraph_get())
+        found[f"{name}_s"] = yield from _a_frame(ui)
+        found[f"{name}_shown"] = state.find(scene).shapes.plants
         yield from ui.picture(name)
+        _play(ui)
+        yield from ui.until(resting, 60.0, "all plants after the timeline")
+        yield from ui.picture(f"{name}_at_rest")
         scene.animation_data_clear()
-    slowest = max(found["day_s"], found["years_s"])
-    found["window_fps"], found["scrub_fps"] = 1.0 / slowest, 1.0 / (slowest - found["empty_draw_s"])
-    session.stop()
+        year.day = 200.0
+    found["scrub_fps"] = 1.0 / max(max(found["day_s"], found["years_s"]) - found["empty_frame_s"], 1e-3)
+
+
+def _play(ui: Any) -> None:
+    """Play the timeline, or stop it."""
+    import bpy
+
+    with ui.override():
+        bpy.ops.screen.animation_play()
+
+
+def _a_frame(ui: Any) -> Iterator[float | None]:
+    """Seconds of a frame of the timeline, which is left playing."""
+    import bpy
+
+    passed = [0]
+
+    def count(*_: object) -> None:
+        passed[0] += 1
+
+    bpy.app.handlers.frame_change_post.append(count)
+    _play(ui)
+    yield from ui.until(lambda: passed[0] >= 4, 300.0, "first frames")
+    first, begin = passed[0], time.process_time()
+    yield from ui.until(lambda: passed[0] >= first + FRAMES, 300.0, "frames")
+    seconds = (time.process_time() - begin) / (passed[0] - first)
+    bpy.app.handlers.frame_change_post.remove(count)
+    return seconds
 
 
 def _look(ui: Any) -> None:
@@ -142,5 +184,6 @@ def _wood(plants: int) -> Any:
         np.arange(plants, dtype=np.int32),
         SPECIES,
     )
+    field.display_type = 'BOUNDS'  # as those of populations
     bpy.context.scene.collection.objects.link(field)
     return field

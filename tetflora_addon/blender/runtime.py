@@ -318,12 +318,14 @@ def last_error() -> tuple[str, list[str]]:
     return _last
 
 
-def redraw() -> None:
-    """Redraw all 3D views with their sidebars, in all windows."""
+def redraw(sidebars: bool = True) -> None:
+    """Redraw all 3D views in all windows, with their headers, toolbars and sidebars or without."""
     for window in getattr(bpy.context.window_manager, "windows", ()):
         for area in window.screen.areas:
             if area.type == 'VIEW_3D':
-                area.tag_redraw()
+                for region in area.regions:
+                    if sidebars or region.type == 'WINDOW':
+                        region.tag_redraw()
 
 
 def complain(text: str) -> None:

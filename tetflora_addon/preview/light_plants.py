@@ -10,7 +10,7 @@ points with the form of their crowns, and those that look largest have faces.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from weakref import WeakKeyDictionary
 
 import numpy as np
@@ -67,7 +67,6 @@ class CrownPoints:
     forms: Floats32  # (n, 4): heights of the lowest and the highest leaves, radii of the crown's rings in leaf; meters
     kinds: Integers32  # (n,): rows of ``looks``
     looks: Floats32  # (k, 7): color of leaves, width of the crown over that in leaf, color of wood; linear RGB
-    some: Seeds | None = None  # some plants of each kind, from which `on_day` takes looks
 
 
 @dataclass(frozen=True)
@@ -171,14 +170,12 @@ def crowns_of(flora: Flora, seeds: Seeds) -> Shapes:
         low, high, *radii = _profiles(flora)[rows["species"][trunk.row]].T
         length, low, wider, _ = outlines(flora, trunk, low, high)
         forms = np.column_stack([low, high, *(wider * radius for radius in radii)]) * length[:, None]
-    some = _some_of_each(seeds)
     crowns = CrownPoints(
         (seeds.position - origin).astype(np.float32),
         seeds.frame[:, :, 2].astype(np.float32),
         forms.astype(np.float32, copy=False),
         seeds.species,
-        _looks_of_kinds(flora, some),
-        some,
+        _looks_of_kinds(flora, _some_of_each(seeds)),
     )
     nothing = np.zeros((0, 3))
     return Shapes(nothing.astype(np.float32), nothing, nothing.astype(np.int32), len(seeds), len(seeds), origin, crowns)
@@ -200,12 +197,6 @@ def _looks_of_kinds(flora: Flora, some: Seeds) -> Floats32:
     return looks
 
 
-def on_day(shapes: Shapes, flora: Flora) -> Shapes:
-    """Points of the same plants, which have ``some``, on another day of the year: only their looks differ."""
-    crowns = shapes.crowns
-    return replace(shapes, crowns=replace(crowns, looks=_looks_of_kinds(flora, crowns.some)))
-
-
 def nearest(shapes: Shapes, eye: Floats, most: int = MOST_FACES) -> tuple[Shapes, float]:
     """Those plants as crowns and trunks with faces that look largest from a place (3,) in the world.
 
@@ -217,6 +208,12 @@ def nearest(shapes: Shapes, eye: Floats, most: int = MOST_FACES) -> tuple[Shapes
     some = np.argpartition(size, -most)[-most:] if len(size) > most else np.arange(len(size))
     some = some[np.argsort(-size[some])]  # the nearest hide what is drawn after them, which then costs little
     least = float(np.sqrt(size[some].min(initial=np.inf)))
+    return with_faces(shapes, some), least
+
+
+def with_faces(shapes: Shapes, some: Integers | slice = slice(None)) -> Shapes:
+    """Points, or some (k,) of them, as crowns and trunks with faces."""
+    crowns = shapes.crowns
     looks, forms, up = crowns.looks[crowns.kinds[some]], crowns.forms[some], crowns.axes[some]
     along = np.where(np.abs(up[:, :1]) < 0.9, [1.0, 0.0, 0.0], [0.0, 1.0, 0.0])
     across = np.cross(up, along)
@@ -225,8 +222,8 @@ def nearest(shapes: Shapes, eye: Floats, most: int = MOST_FACES) -> tuple[Shapes
     widths = looks[:, 3:4] * forms[:, 2:]
     corners = crowns.positions[some], frame, forms[:, :2], widths, _THIN * forms[:, 1], looks[:, :3], looks[:, 4:]
     positions, colors = _crowns(*corners)
-    indices = _repeated(_faces(), len(_NORMALS), len(some))
-    return Shapes(positions, colors, indices, len(some), shapes.of, shapes.origin), least
+    indices = _repeated(_faces(), len(_NORMALS), len(up))
+    return Shapes(positions, colors, indices, len(up), shapes.of, shapes.origin)
 
 
 def bounds_of_plants(flora: Flora, seeds: Seeds, most: int = MOST_PLANTS) -> Shapes:
@@ -275,6 +272,17 @@ def _profiles(flora: Flora) -> Floats:
     if summer not in _known:
         _known[summer] = np.stack([_profile(flora, int(row)) for row in flora.first_row])
     return _known[summer]
+
+
+def crown_areas(flora: Flora) -> Floats:
+    """Areas (s,) of the crowns of species from the side, of mean length and on the flora's day, m²."""
+    low, high, *radii = _profiles(flora).T
+    length = flora.rows["length"][flora.first_row, 0]
+    if flora.day is not None:
+        left = [np.mean(flora.day.share_range(flora.rows, number)) for number in range(len(length))]
+        radii = (_BARE + (1.0 - _BARE) * np.minimum(left, 1.0)) * radii
+    # A cone below the rings and one above, and between them what is as wide as both on average.
+    return (high - low) * sum(radii) * 0.5 * (1.0 + _RINGS[1] - _RINGS[0]) * length**2
 
 
 def _profile(flora: Flora, row: int) -> Floats:

@@ -259,6 +259,7 @@ def test_many_plants_become_a_field_unasked():
     bpy.ops.tetflora.populate(count=10_001, min_distance=0.0, species="bush")
     fields = [o for o in bpy.data.objects if o.tetflora.is_field]
     assert [len(o.data.vertices) for o in fields] == [10_001]
+    assert fields[0].display_type == 'BOUNDS'  # its plants show as shapes, and so many dots take long to draw
     assert not [o for o in bpy.data.objects if o.tetflora.is_plant]
     assert bpy.context.view_layer.objects.active == ground
     with pytest.raises(RuntimeError, match="exceed the limit of 100,000"):

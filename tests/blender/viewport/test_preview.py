@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from types import SimpleNamespace
 
 import bpy
@@ -15,8 +16,10 @@ from panels.refine import TETFLORA_PT_refine
 from tests.blender.scenes import add_camera, add_plant, datablocks, depsgraph
 from tetflora_addon import errors
 from tetflora_addon.blender.job import refine
+from tetflora_addon.blender.scene.fields import write_field
 from tetflora_addon.blender.viewport import auto, levels, overlay, state
 from tetflora_addon.blender.viewport.levels import _on_timer, _on_update, level_steps, read_shapes
+from tetflora_addon.preview import running
 
 pytestmark = pytest.mark.usefixtures("clean_file")
 
@@ -171,6 +174,53 @@ def test_plants_are_shown_where_they_stand(form, corners):
     assert datablocks() == before
     scene.tetflora.preview.plants = 'NONE'
     assert state.find(scene).shapes is None
+
+
+def test_while_the_timeline_runs_plants_are_read_once_and_at_rest_all_are_shown(monkeypatch):
+    """From above three quarters of a wood are in view, of which some are shown, by day and by year; then all again."""
+    number, rng = 400, np.random.default_rng(2)
+    place = np.column_stack([rng.uniform(-40.0, 40.0, (number, 2)), np.zeros(number)])
+    kinds, upright = np.arange(number, dtype=np.int32) % 2, np.tile([1.0, 0.0, 0.0, 0.0], (number, 1))
+    field = write_field("wood", place, upright, np.ones(number), kinds, np.arange(number), ["birch", "spruce"])
+    scene = bpy.context.scene
+    scene.collection.objects.link(field)
+    scene.tetflora.preview.plants, year = 'LIGHT', scene.tetflora.year
+    year.enabled, year.day = True, 180.0
+    before, preview = read_shapes(scene, depsgraph()), state.find(scene)
+    views = [np.array([[0.025, 0, 0, 0.5], [0, 0.025, 0, 0], [0, 0, -0.01, 0], [0, 0, 0, 1.0]])]
+    monkeypatch.setattr(levels, "shown", partial(running.shown, most=100))
+    monkeypatch.setattr(levels, "_moved", lambda _: False)
+    read, reads = levels.read_plants, []
+    monkeypatch.setattr(levels, "read_plants", lambda *given: reads.append(given) or read(*given))
+    seen = []
+    for day, years in ((200.0, 0.0), (20.0, 0.0), (20.0, 5.0), (20.0, 60.0)):
+        year.day, year.years = day, years
+        levels.follow(scene, depsgraph(), preview, views)
+        assert 60 < preview.shapes.plants < 140
+        assert preview.shapes.of == number
+        assert preview.shapes.positions[:, 0].max() < 40.0
+        assert f"{preview.shapes.plants} of 400" in overlay.lines_of(scene, preview)[-1][0]
+        seen.append((preview.shapes.colors.mean(axis=0), preview.shapes.positions[:, 2].max()))
+    assert len(reads) == 1
+    assert not np.allclose(seen[0][0], seen[1][0], atol=0.02)  # autumn's crowns are bare in winter
+    assert seen[2][1] < 0.5 * seen[3][1]
+    levels.follow(scene, depsgraph(), preview, [views[0] + np.diag([0, 0, 0, 9.0])])
+    assert len(reads) == 1  # another view looks at the same plants
+    for year.years in (60.0, 0.0):
+        levels.follow(scene, depsgraph(), preview, [np.diag([0.025, 0.025, -0.01, 1.0]) + np.diag([9.0], 3)])
+        assert preview.shapes is None or preview.shapes.plants == 0  # it looks past them
+    year.day, year.years = 180.0, 0.0
+    after = read_shapes(scene, depsgraph())
+    assert preview.running is None
+    np.testing.assert_array_equal(after.positions, before.positions)
+    np.testing.assert_array_equal(after.colors, before.colors)
+
+
+def test_while_the_timeline_runs_nothing_is_read_for_all_plants(monkeypatch):
+    scene_of_plants()
+    monkeypatch.setattr(levels, "timeline_moves", lambda: True)
+    monkeypatch.setattr(levels, "read_shapes", lambda *_: pytest.fail("reads all plants"))
+    assert _on_timer() > 0.0
 
 
 def test_figures_say_what_is_shown():

@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 
 from tests.engine import support
-from tetflora_addon.growth.seasons import Season
 from tetflora_addon.preview import light_plants
 
 #: Species, and how far to the east.
@@ -43,21 +42,6 @@ def test_points_have_the_form_and_color_of_the_crowns_with_faces() -> None:
     feet = (some.positions.reshape(5, -1, 3)[:, 10:14].mean(axis=1) + some.origin)[:, None] - seeds.position
     assert set(np.linalg.norm(feet, axis=2).argmin(axis=1)) == set(np.argsort(angle)[-5:])
     assert least == pytest.approx(np.sort(angle)[-5], rel=1e-4)
-
-
-@pytest.mark.parametrize("day", [20.0, 290.0])
-def test_on_another_day_points_look_as_if_they_were_made_on_it(day: float) -> None:
-    flora, seeds = (
-        support.flora(),
-        support.plants(np.arange(40), support.SPECIES.index("birch"), np.zeros((40, 3)), 1.0),
-    )
-    points = light_plants.light_plants(flora, seeds, most=10)
-    later = flora.in_year(Season(day))
-    anew, followed = light_plants.light_plants(later, seeds, most=10), light_plants.on_day(points, later)
-    assert np.array_equal(anew.crowns.looks, followed.crowns.looks)
-    assert followed.crowns.positions is points.crowns.positions
-    number = support.SPECIES.index("birch")
-    assert not np.allclose(points.crowns.looks[number], followed.crowns.looks[number], atol=0.01)
 
 
 def test_points_of_two_kinds_are_joined_with_their_looks() -> None:

@@ -150,8 +150,7 @@ def make_plants_steps(data: JobData, population: TetFloraLayer) -> Job[PlacedPla
     collection = collection_of(scene, population)
     if field:
         made = [add_field(scene, placement, search.species, collection, ages)]
-        if is_cover(population):
-            made[0].display_type = 'BOUNDS'  # its points would turn the ground black
+        made[0].display_type = 'BOUNDS'  # its points would turn the ground black, and many take long to draw
     elif own:
         made = run_to_end(add_plants_steps(scene, placement, search.species, collection, ages))
     for number, obj in enumerate(made):

@@ -251,6 +251,22 @@ def _by_suffix(scene: bpy.types.Scene, camera: Camera, depsgraph: bpy.types.Deps
 _NEAREST = 1e-6
 
 
+def timeline_moves() -> bool:
+    """Whether an animation is played, or a frame is dragged, in any window."""
+    manager = bpy.context.window_manager
+    screens = [window.screen for window in ([] if manager is None else manager.windows)]
+    return any(screen.is_animation_playing or screen.is_scrubbing for screen in screens)
+
+
+def views_of(scene: bpy.types.Scene) -> list[NDArray[np.float64]]:
+    """Matrices (4, 4) from the world to clip space of all viewports that show a scene, as they were last drawn."""
+    manager = bpy.context.window_manager
+    windows = [window for window in ([] if manager is None else manager.windows) if window.scene == scene]
+    spaces = [area.spaces.active for window in windows for area in window.screen.areas if area.type == 'VIEW_3D']
+    views = [view for space in spaces for view in (space.region_quadviews or [space.region_3d])]
+    return [np.array(view.perspective_matrix, np.float64) for view in views]
+
+
 def viewport_of(scene: bpy.types.Scene) -> tuple[bpy.types.SpaceView3D, bpy.types.Region] | None:
     """The viewport of a scene that has a view of its own: one with rendered shading if there is one, else the largest.
 

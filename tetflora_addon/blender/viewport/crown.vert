@@ -9,7 +9,7 @@ void main() {
   if (form.y > eye.w * distance(pos, eye.xyz)) {  // it has faces
     gl_Position = vec4(2.0, 2.0, 2.0, 1.0);
   }
-  color = look.rgb;
+  color = pow(look.rgb, vec3(2.2));
   shape = vec4(tall, form.z * look.a, form.w * look.a, 0.012 * form.y) / half_size;
   low = clamp(form.x / max(form.y, 1e-6), 0.0, 0.95);
 }

@@ -6,12 +6,13 @@ Without a window, plants are read only on request, and the only handlers are tho
 """
 
 import time
-from collections.abc import Callable, Generator
+from collections.abc import Callable, Generator, Sequence
 from dataclasses import replace
 from itertools import count
 
 import bpy
 import numpy as np
+from numpy.typing import NDArray
 
 from ...compiled.flora import Flora, compile_species
 from ...compiled.recorded_sizes import measure_of
@@ -23,29 +24,31 @@ from ...preview.light_plants import (
     MOST_FACES,
     Shapes,
     bounds_of_plants,
+    crown_areas,
     crowns_of,
     joined,
     light_plants,
-    on_day,
     simple_crowns,
     thinned,
+    with_faces,
 )
+from ...preview.running import InView, in_view, shown
 from ...refinement.loop import refine as refine_loop
 from ..job.assets import bind_steps
 from ..job.contents import compile_for, in_year, load_for, memory_left, read_scene, refinement_settings
 from ..main_thread import on_main_thread
 from ..runtime import Handlers, JobData, call_off, call_soon, job, redraw
 from ..scene.ages import crown_kinds, plainly_aged
-from ..scene.camera import read_camera
+from ..scene.camera import read_camera, timeline_moves, views_of
 from ..scene.crowns import crown_for
 from ..scene.field_sizes import stand_years
 from ..scene.objects import has_contents, is_drop, taking_part
-from ..scene.plants import NoPlantsError, read_asset_plants, read_plants
+from ..scene.plants import NoPlantsError, gone_species, read_asset_plants, read_plants
 from ..settings import season_of, years_of
 from ..species import edits
 from ..worker import call_in_thread, steps_in_thread
 from . import state
-from .state import Preview, camera_now, find, of
+from .state import Preview, Running, camera_now, find, of
 
 _MANY_KINDS = 12  # more are compiled one by one, and kept
 _SOON = 0.2  # seconds from a change of plants to reading them again
@@ -108,7 +111,7 @@ def read_shapes(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> Shape
         preview.shapes, preview.message = None, str(error)
     except TetFloraError as error:
         preview.message = str(error)
-    preview.made += 1
+    preview.made, preview.running = preview.made + 1, None
     preview.seconds = time.thread_time() - begin
     redraw()
     return preview.shapes
@@ -118,11 +121,7 @@ def _shapes_of(
     scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, make: Callable[[Flora, Seeds], Shapes]
 ) -> Shapes:
     """Plants that grow in the form of ``make``, and those that are assets as simple crowns."""
-    crowns = []
-    for plants in read_asset_plants(scene, depsgraph):
-        crown = crown_for(scene, plants.species)
-        size = crown.radius, crown.base, crown.height
-        crowns.append(simple_crowns(plants.matrices, size, crown.color, boxes=make is bounds_of_plants))
+    crowns = _asset_crowns(scene, depsgraph, boxes=make is bounds_of_plants)
     try:
         seeds, _, of(scene).message = read_plants(scene, depsgraph)
     except NoPlantsError:
@@ -133,12 +132,25 @@ def _shapes_of(
     return joined([*grown, *crowns]) if crowns or len(grown) > 1 else grown[0]
 
 
+def _asset_crowns(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, boxes: bool) -> list[Shapes]:
+    found = []
+    for plants in read_asset_plants(scene, depsgraph):
+        crown = crown_for(scene, plants.species)
+        found.append(simple_crowns(plants.matrices, (crown.radius, crown.base, crown.height), crown.color, boxes))
+    return found
+
+
 def _grown(
-    scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, make: Callable[[Flora, Seeds], Shapes], seeds: Seeds
+    scene: bpy.types.Scene,
+    depsgraph: bpy.types.Depsgraph,
+    make: Callable[[Flora, Seeds], Shapes],
+    seeds: Seeds,
+    seen: InView | None = None,
 ) -> list[Shapes]:
     """Plants that grow in the form of ``make``; many kinds of them one by one, which are known from other years.
 
     As years pass they have the forms of classes of ages, and their own heights: no year has to wait for its species.
+    Of those that are ``seen``, which are ``seeds`` then, `running.shown` has chosen.
     """
     years = years_of(scene)
     if years > 0.0:
@@ -147,8 +159,15 @@ def _grown(
         seeds = replace(seeds, identifiers=kinds, species=number, scale=seeds.scale * taller)
     kinds = seeds.identifiers
     if years == 0.0 and len(kinds) <= _MANY_KINDS:
-        return [make(in_year(scene, compile_for(kinds, scene, depsgraph)), seeds)]
+        flora = in_year(scene, compile_for(kinds, scene, depsgraph))
+        if seen is not None:
+            areas = crown_areas(flora)[seeds.species] * seeds.scale**2
+            seeds = shown(replace(seen, seeds=seeds), areas)
+        return [make(flora, seeds)]
     loaded, out = load_for(kinds, scene, depsgraph, 0.0), []
+    if seen is not None:
+        areas = np.concatenate([crown_areas(in_year(scene, measure_of(species).flora)) for species in loaded])
+        seeds = shown(replace(seen, seeds=seeds), areas[seeds.species] * seeds.scale**2)
     if make is light_plants and len(seeds) > MOST_FACES:
         make, some = crowns_of, seeds
     else:
@@ -159,7 +178,7 @@ def _grown(
             one = replace(own, identifiers=(kinds[number],), species=np.zeros(len(own), np.int32))
             out.append(make(in_year(scene, measure_of(species).flora), one))
     left = len(seeds) - len(some)
-    return [replace(out[0], of=out[0].of + left), *out[1:]]
+    return [replace(one, of=one.of + left * (one is out[0])) for one in out]
 
 
 def schedule() -> None:
@@ -169,7 +188,9 @@ def schedule() -> None:
         call_soon(_on_timer, max([_SOON, *(preview.seconds for preview in state.previews.values())]))
 
 
-def _on_timer() -> None:
+def _on_timer() -> float | None:
+    if timeline_moves():
+        return _SOON  # all plants are read when it rests
     for window in bpy.context.window_manager.windows:
         scene = window.scene
         # Reading a large scene without plants takes seconds; one that had some has to lose their shapes.
@@ -177,6 +198,7 @@ def _on_timer() -> None:
             depsgraph = window.view_layer.depsgraph
             if depsgraph is not None:
                 read_shapes(scene, depsgraph)
+    return None
 
 
 def _on_update(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
@@ -205,28 +227,57 @@ def _on_frame(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph | None = No
     preview = find(scene)
     if scene.tetflora.preview.plants == 'NONE' or preview is None or preview.moment == _moment(scene):
         return
-    shown = depsgraph is not None and depsgraph.mode == 'VIEWPORT'  # frames of a render are not the artist's
-    if shown and preview.seconds < _QUICK and on_main_thread():
-        if not _went_by(scene, depsgraph, preview):
-            read_shapes(scene, depsgraph)
-    else:
+    watched = depsgraph is not None and depsgraph.mode == 'VIEWPORT'  # frames of a render are not the artist's
+    if not watched or not on_main_thread():
         schedule()
+    elif timeline_moves() and scene.tetflora.preview.plants == 'LIGHT':
+        follow(scene, depsgraph, preview, views_of(scene))
+        schedule()
+    elif preview.seconds >= _QUICK:
+        schedule()
+    else:
+        read_shapes(scene, depsgraph)
 
 
-def _went_by(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, preview: Preview) -> bool:
-    """Show points of the same plants on another day, where nothing else can have changed; whether that was so."""
-    shapes, moved = preview.shapes, (u for u in depsgraph.updates if u.is_updated_transform or u.is_updated_geometry)
-    others = any(not (isinstance(u.id, bpy.types.Object) and u.id.type in {'CAMERA', 'LIGHT'}) for u in moved)
-    if others or shapes is None or shapes.crowns is None or shapes.crowns.some is None:
-        return False
-    moment = _moment(scene)
-    if moment[1:] != preview.moment[1:] or years_of(scene) > 0.0:
-        return False
-    flora = in_year(scene, compile_for(shapes.crowns.some.identifiers, scene, depsgraph))
-    preview.shapes, preview.moment = on_day(shapes, flora), moment
+def _moved(depsgraph: bpy.types.Depsgraph) -> bool:
+    """Whether anything but a camera or a light is elsewhere than in the frame before."""
+    changed = (u.id for u in depsgraph.updates if u.is_updated_transform or u.is_updated_geometry)
+    return any(not (isinstance(one, bpy.types.Object) and one.type in {'CAMERA', 'LIGHT'}) for one in changed)
+
+
+def _faces_of(flora: Flora, seeds: Seeds) -> Shapes:
+    """Plants as those are that look largest among very many."""
+    return with_faces(crowns_of(flora, seeds))
+
+
+def follow(
+    scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, preview: Preview, views: Sequence[NDArray[np.float64]]
+) -> None:
+    """Show some of the plants in view, on the scene's day and in its year; they are read at the first frame only.
+
+    Parameters
+    ----------
+    scene, depsgraph, preview
+    views : list of (4, 4) float64
+        From the world to what viewports show of it.
+    """
+    try:
+        running, known = preview.running, (stand_years(scene), gone_species(scene))
+        if running is None or running.known != known or _moved(depsgraph):
+            others, (seeds, _, _) = _asset_crowns(scene, depsgraph, False), read_plants(scene, depsgraph)
+            running = preview.running = Running(seeds, others, known)
+        if running.seen is None or not np.array_equal(running.views, views):
+            running.seen, running.views = in_view(running.seeds, views), views
+        seen, others = running.seen, running.others
+        make = light_plants if len(running.seeds) <= MOST_FACES else _faces_of
+        parts = [*_grown(scene, depsgraph, make, seen.seeds, seen), *others]
+    except TetFloraError:  # which is told when all are read
+        return
+    of_all = len(running.seeds) + sum(one.of for one in others)
+    preview.shapes = replace(joined(parts) if parts[1:] else parts[0], of=of_all) if parts else None
+    preview.moment = _moment(scene)
     preview.made += 1
-    redraw()
-    return True
+    redraw(sidebars=False)
 
 
 def _moment(scene: bpy.types.Scene) -> tuple:

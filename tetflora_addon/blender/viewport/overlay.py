@@ -9,7 +9,7 @@ changes, as many as the last view could draw in a moment.
 import sys
 import time
 import traceback
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from functools import cache
 from pathlib import Path
 
@@ -17,6 +17,7 @@ import blf
 import bpy
 import gpu
 import numpy as np
+from mathutils import Matrix
 from numpy.typing import NDArray
 
 from ...arrays import Floats, Floats32
@@ -39,7 +40,7 @@ _MOMENT = 0.03
 _LEAST, _MOST = 500, 20_000
 _FROZEN = (1.0, 0.75, 0.2, 1.0)
 _TEXT, _COMPLAINT = (0.95, 0.95, 0.95, 1.0), (1.0, 0.7, 0.3, 1.0)
-_SHADER = Path(__file__).with_name("crown")
+_SOURCES = Path(__file__).parent
 _handles: list[object] = []
 
 
@@ -144,15 +145,33 @@ def _crown_shader() -> gpu.types.GPUShader:
     for kind, name in (('VEC3', "color"), ('VEC4', "shape"), ('FLOAT', "low"), ('FLOAT', "pixels")):
         passed.flat(kind, name)
     info = gpu.types.GPUShaderCreateInfo()
-    info.push_constant('MAT4', "matrix")
     info.push_constant('VEC4', "view")  # pixels of a meter at a depth of 1, how far one looks down, 0 to 1
     info.push_constant('VEC4', "eye")  # whence, and from which height over the distance on, plants have faces
-    for number, (kind, name) in enumerate((('VEC3', "pos"), ('VEC4', "form"), ('VEC4', "look"))):
-        info.vertex_in(number, kind, name)
+    return _shader("crown", info, passed, (('VEC3', "pos"), ('VEC4', "form"), ('VEC4', "look")))
+
+
+@cache
+def _faces_shader() -> gpu.types.GPUShader:
+    """Opaque faces; Blender's own shader encodes colors again for each pixel."""
+    passed = gpu.types.GPUStageInterfaceInfo("faces_interface")
+    passed.smooth('VEC3', "linear")
+    return _shader("faces", gpu.types.GPUShaderCreateInfo(), passed, (('VEC3', "pos"), ('VEC4', "color")))
+
+
+def _shader(
+    name: str,
+    info: gpu.types.GPUShaderCreateInfo,
+    passed: gpu.types.GPUStageInterfaceInfo,
+    columns: Iterable[tuple[str, str]],
+) -> gpu.types.GPUShader:
+    """That of the files of a name, from columns of corners or points and their ``matrix`` to clip space."""
+    info.push_constant('MAT4', "matrix")
+    for number, (kind, column) in enumerate(columns):
+        info.vertex_in(number, kind, column)
     info.vertex_out(passed)
     info.fragment_out(0, 'VEC4', "fragColor")
-    info.vertex_source(_SHADER.with_suffix(".vert").read_text(encoding="utf-8"))
-    info.fragment_source(_SHADER.with_suffix(".frag").read_text(encoding="utf-8"))
+    info.vertex_source(_SOURCES.joinpath(f"{name}.vert").read_text(encoding="utf-8"))
+    info.fragment_source(_SOURCES.joinpath(f"{name}.frag").read_text(encoding="utf-8"))
     return gpu.shader.create_from_info(info)
 
 
@@ -161,13 +180,17 @@ def _draw_points(made: gpu.types.GPUBatch, origin: Floats, eye: Floats, least: f
     shader = _crown_shader()
     with gpu.matrix.push_pop():
         gpu.matrix.translate(origin.tolist())
-        shader.uniform_float("matrix", gpu.matrix.get_projection_matrix() @ gpu.matrix.get_model_view_matrix())
+        shader.uniform_float("matrix", _to_clip())
         down = abs(region.view_matrix[2][2])
         shader.uniform_float("view", (0.5 * height * region.window_matrix[1][1], down, 0.0, 0.0))
         shader.uniform_float("eye", (*(eye - origin).tolist(), least))
         gpu.state.program_point_size_set(True)
         made.draw(shader)
         gpu.state.program_point_size_set(False)
+
+
+def _to_clip() -> Matrix:
+    return gpu.matrix.get_projection_matrix() @ gpu.matrix.get_model_view_matrix()
 
 
 def pyramid(camera: Camera, far: float, color: tuple[float, float, float, float]) -> gpu.types.GPUBatch:
@@ -219,6 +242,14 @@ def _draw(made: gpu.types.GPUBatch | None, origin: Floats) -> None:
             made.draw(gpu.shader.from_builtin('SMOOTH_COLOR'))
 
 
+def _draw_faces(made: gpu.types.GPUBatch, origin: Floats) -> None:
+    shader = _faces_shader()
+    with gpu.matrix.push_pop():
+        gpu.matrix.translate(origin.tolist())
+        shader.uniform_float("matrix", _to_clip())
+        made.draw(shader)
+
+
 def _draw_plants(preview: Preview) -> None:
     shapes = preview.shapes
     made, near, eye, least = _kept(preview, "plants", (preview.made,), lambda: plants(shapes)), None, None, 0.0
@@ -231,8 +262,9 @@ def _draw_plants(preview: Preview) -> None:
     gpu.state.depth_test_set('LESS_EQUAL')
     gpu.state.depth_mask_set(True)
     gpu.state.face_culling_set('BACK')  # crowns and trunks are closed
-    _draw(made, shapes.origin)
-    _draw(near, shapes.origin)
+    for one in (made, near):
+        if one is not None:
+            _draw_faces(one, shapes.origin)
     gpu.state.face_culling_set('NONE')
     if shapes.crowns is not None:
         dots = _kept(preview, "points", (preview.made,), lambda: points(preview))

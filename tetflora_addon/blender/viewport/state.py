@@ -12,9 +12,11 @@ import bpy
 
 from ...camera.camera import Camera
 from ...errors import TetFloraError
+from ...growth.seeds import Seeds
 from ...parameters import within
 from ...preview.levels import Levels
 from ...preview.light_plants import Shapes
+from ...preview.running import InView
 from ..declare import FIXED, HIDDEN, boolean, choice, integer
 from ..runtime import Listeners, redraw
 from ..scene.camera import read_camera
@@ -36,6 +38,17 @@ listeners = Listeners()
 
 
 @dataclass
+class Running:
+    """Plants that stay the same while the timeline runs."""
+
+    seeds: Seeds
+    others: list[Shapes]  # plants that are assets
+    known: tuple  # stands' years and species without plants, when they were read
+    seen: InView | None = None  # those in the views of viewports
+    views: tuple = ()  # how these looked then
+
+
+@dataclass
 class Preview:
     """What is shown of one scene."""
 
@@ -45,6 +58,7 @@ class Preview:
     shapes: Shapes | None = None  # all plants in the form that is chosen
     objects: int = 0  # objects of the scene when they were read
     moment: tuple = ()  # its day of the year and years then
+    running: Running | None = None  # what is read once while the timeline runs
     message: str = ""  # why plants cannot be shown; empty if they can
     seconds: float = 0.0  # of the processor that reading them took
     made: int = 0  # counts changes of levels and shapes, to know what the graphics card already has
