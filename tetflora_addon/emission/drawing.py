@@ -20,7 +20,7 @@ from ..arrays import Arrays, Floats, Floats32, Integers, Keys, Mask, gathered, u
 from ..buffers import MeshBuffers, concatenate_buffers, kept_faces
 from ..camera.camera import Camera
 from ..compiled.flora import Flora
-from ..growth.hashing import mix, uniform
+from ..growth.hashing import place_keys, uniform
 from ..processes.pool import in_processes
 from ..proxies.cast_shadows import ShadowReach
 from ..proxies.facet_weights import FacetWeights
@@ -305,7 +305,7 @@ class _Tile:
             there: dict[Any, Any] = {what: joined(own) for what, own in self._facets.items() if what[1] == seen}
             if seen is None:
                 there = {what: concatenate_buffers(own) for what, own in self._meshes.items()}
-            ranks = [size(one) if seen is None else uniform(_keys_of(_places(one)), _LEFT) for one in there.values()]
+            ranks = [size(one) if seen is None else uniform(place_keys(_places(one)), _LEFT) for one in there.values()]
             first = np.cumsum([0, *map(len, ranks)])
             gone = int(min(np.ceil(max(number, 0.0)), first[-1]))
             if not gone:
@@ -374,7 +374,7 @@ class _Tile:
             seen = np.flatnonzero(~gone)
             gone[seen] = self.coverage.hidden(prints.take(seen))
             some = np.flatnonzero(gone)
-            number = uniform(_keys_of(corners[some, 0]), _MERGE)
+            number = uniform(place_keys(corners[some, 0]), _MERGE)
             likely = np.flatnonzero(number < max(0.5, self._left))
             some, number = some[likely], number[likely]
             if isinstance(made, Facets):
@@ -526,7 +526,7 @@ class _Tile:
         for kind, pool, side, kept, number in drawn:
             # Most parts have a small part of a facet each: so many fewer of them have so much more, which is as much.
             scarce = (number > 0.0) & (number < 0.5 * times**2 / leaves) & (not kind.stays)
-            chosen = scarce & (uniform(_keys_of(pool.center), _SCARCE) < 1.0 / leaves)
+            chosen = scarce & (uniform(place_keys(pool.center), _SCARCE) < 1.0 / leaves)
             for more, some in ((1.0, np.flatnonzero(~scarce)), (np.sqrt(leaves), np.flatnonzero(chosen))):
                 given = pool.parts.take(some), times * side[some] / more, kept[some], self.frontier.shown
                 for whose, facets in kind.unseen(*given) if len(some) else ():
@@ -538,14 +538,6 @@ class _Tile:
         if len(facets):
             form = self.given.form
             self._facets.setdefault((whose, seen), []).append(facets if form is None else form(facets, seen))
-
-
-def _keys_of(center: Floats) -> NDArray[np.uint64]:
-    """Keys (n,) of things by their places (n, 3), to a tenth of a millimeter."""
-    key = np.zeros(len(center), np.uint64)
-    for axis in range(3):
-        key = mix(key ^ np.rint(center[:, axis] * 1e4).astype(np.int64).view(np.uint64))
-    return key
 
 
 def _places(drawn: Primitive) -> Floats:

@@ -3,7 +3,7 @@
 """Which plants are shown while the timeline runs: some of those in view, with the cover of all.
 
 In a view over a forest each crown hides most of those behind it, and drawing them all takes the longer the more they
-hide each other. A random number of each plant decides whether it is shown, so that the same ones are from frame to
+hide each other. A random number of each place decides whether it is shown, so that the same ones are from frame to
 frame, and what is shown is spread evenly.
 """
 
@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..arrays import Arrays, Floats, Integers
-from ..growth.hashing import key_of_seed, uniform
+from ..growth.hashing import place_keys, uniform
 from ..growth.seeds import Seeds
 
 #: Plants that are shown at most.
@@ -51,7 +51,7 @@ def in_view(seeds: Seeds, views: Sequence[Floats]) -> InView:
         covered[inside[larger]] = area[larger]
         part[inside[larger]] = (x + _PARTS * (y + _PARTS * number))[larger]
     some = np.flatnonzero(covered > 0.0)
-    return InView(seeds.take(some), part[some], covered[some], uniform(key_of_seed(seeds.seed[some]), _SHOWN))
+    return InView(seeds.take(some), part[some], covered[some], uniform(place_keys(seeds.position[some]), _SHOWN))
 
 
 def shown(plants: InView, areas: Floats, most: int = MOST) -> Seeds:

@@ -4,6 +4,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -66,3 +68,13 @@ def test_as_plants_grow_the_same_ones_stay_and_fewer_are_needed(seeds: Seeds) ->
     assert len(old) < len(young)
     assert len(next_year - young) < 0.01 * len(young)  # those that fill a part of the view by then
     assert (np.diff(shown[0].position[:, 1]) >= 0.0).all()  # the nearest are drawn first
+
+
+def test_plants_of_one_seed_are_thinned_like_others(seeds: Seeds) -> None:
+    """As where an artist has duplicated one."""
+    shown = [
+        running.shown(found, np.full(len(found.seeds), 30.0), most=2_000)
+        for found in (running.in_view(one, [VIEW]) for one in (seeds, replace(seeds, seed=np.zeros_like(seeds.seed))))
+    ]
+    assert 0 < len(shown[0]) < len(seeds) // 4
+    np.testing.assert_array_equal(shown[0].position, shown[1].position)
