@@ -42,6 +42,9 @@ def leaf_roughness(gloss: float) -> float:
     return float(np.interp(gloss, mirrored[::-1], _ROUGHNESS[::-1]))
 
 
+#: Alpha under which leaves are cut out. Their polygons lie within outlines, and from afar a texture shows the mean of a
+#: cell: leaves would vanish at a half.
+CUT = 0.05
 #: Attributes of points by name, each with its type and values.
 PointAttributes = Mapping[str, tuple[str, NDArray]]
 

@@ -137,7 +137,7 @@ def _surface(scene: bpy.types.Scene, look: _Look, folder: Path, textures: str, b
         if images["normal"][..., :2].std() < _EVEN:
             del images["normal"]
     detail = images.get("color", np.ones((TEXELS, TEXELS, 3), np.float32))
-    shown = None if is_bark else outline(look.palette, look.meshes[0])
+    shown = None if is_bark else np.any([outline(look.palette, mesh) for mesh in look.meshes], axis=0)
     seen = detail.reshape(-1, 3) if shown is None else detail[shown]
     detail = detail / np.maximum(seen.mean(axis=0), 1e-6)
     files = {"color": atlas(look.palette, detail, shown)}
