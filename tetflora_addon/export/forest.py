@@ -32,19 +32,14 @@ _MIRRORED = (
 
 
 def leaf_roughness(gloss: float) -> float:
-    """Roughness at which a surface by Fresnel mirrors as much as leaves do, both facing it and on the whole.
-
-    At grazing angles it mirrors more than leaves: were it as smooth, it would mirror less where they are seen best.
-    """
+    """Roughness at which a surface by Fresnel mirrors as much as leaves do, both facing it and on the whole."""
     amplitude = np.sqrt(FACING * gloss)
     index = (1.0 + amplitude) / (1.0 - amplitude)
-    mirrored = [np.interp(index, _INDEX, row) for row in _MIRRORED]
-    return float(np.interp(gloss, mirrored[::-1], _ROUGHNESS[::-1]))
+    mirrored = [np.interp(index, _INDEX, row) for row in _MIRRORED[::-1]]
+    return float(np.interp(gloss, mirrored, _ROUGHNESS[::-1]))
 
 
-#: Alpha under which leaves are cut out. Their polygons lie within outlines, and from afar a texture shows the mean of a
-#: cell: leaves would vanish at a half.
-CUT = 0.05
+CUT = 0.05  # alpha under which leaves are cut out: from afar a texture shows the mean of a cell, mostly under a half
 #: Attributes of points by name, each with its type and values.
 PointAttributes = Mapping[str, tuple[str, NDArray]]
 

@@ -40,9 +40,7 @@ from ..results.leaf_objects import materials_of
 from ..species.edits import species_for
 
 _BARK = 0.9  # roughness, where it has not been baked
-#: What roughness varies by at most where it is a number, not a texture, and normals by their standard deviation where
-#: there is no relief: readers take away more light for any relief than one as flat would.
-_EVEN = 0.02
+_EVEN = 0.02  # what roughness varies by where it is a number, and the standard deviation of normals without a relief
 _ABOVE = 4.0  # meters up a trunk where its bark is baked: beyond what is peculiar to its foot
 
 
