@@ -18,6 +18,7 @@ from mathutils import Vector
 from numpy.typing import NDArray
 
 from devtools import session
+from tests.blender.renders import EEVEE_SAMPLES, few_directions
 from tests.blender.scenes import add_camera, add_plant, depsgraph
 from tetflora_addon.blender.attributes import image_pixels
 from tetflora_addon.blender.export.forest import ExportOrder, export_steps, kinds_of, read_plants, variants_of
@@ -96,6 +97,10 @@ def pictures(points: NDArray, path: Path, engine: str = 'CYCLES', number: int = 
     """Pictures (h, w, 4) of the scene around points, in linear RGB and alpha."""
     scene = bpy.context.scene
     _light(scene)
+    few_directions(scene.world)
+    scene.world.probe_resolution = '128'
+    # For each picture EEVEE would draw a large sky and empty half a gigabyte for shadows; a sample takes .3 s.
+    scene.eevee.shadow_pool_size, samples = '16', _SAMPLES if engine == 'CYCLES' else EEVEE_SAMPLES
     camera = add_camera().data
     camera.type, camera.clip_end = 'ORTHO', 1e5
     scene.render.resolution_x = scene.render.resolution_y = side
@@ -105,7 +110,7 @@ def pictures(points: NDArray, path: Path, engine: str = 'CYCLES', number: int = 
     for eye in eyes(number):
         scene.camera.location = middle + 3.0 * camera.ortho_scale * eye
         scene.camera.rotation_euler = Vector(-eye).to_track_quat('-Z', 'Y').to_euler()
-        render(scene, path, _SAMPLES, engine=engine, form='OPEN_EXR')
+        render(scene, path, samples, engine=engine, form='OPEN_EXR')
         image = bpy.data.images.load(str(path))
         made.append(image_pixels(image).astype(np.float64))
         bpy.data.images.remove(image)

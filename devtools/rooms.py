@@ -71,7 +71,7 @@ _TABLE = {
     "blender/results",
     "blender/viewport": f". species growth compiled tetrahedra camera refinement preview {_LOW} {_HIGH}",
     "blender/export": ". species growth compiled camera planting export blender blender/species blender/scene "
-    "blender/placing blender/geodata blender/results blender/job",
+    "blender/placing blender/geodata blender/materials blender/results blender/job",
     "blender/cli": ". blender blender/scene blender/job blender/export",
     "operators": ". species assets camera refinement preview planting geodata blender blender/species blender/scene "
     f"blender/assets {_HIGH} {_LAND} blender/viewport",

@@ -15,6 +15,8 @@ from .arrays import Floats
 #: Fraction of light that the waxy surface of leaves mirrors without color (4 % at a refractive index of 1.5); what they
 #: scatter is the rest times their color.
 GLOSS = 0.04
+#: What of `GLOSS` is mirrored at all angles; the rest comes at grazing ones.
+FACING = 0.85
 #: Light that has passed through a leaf lost more of its blue than light that was reflected: chlorophyll and carotenoids
 #: absorb on the whole way. Products over 1 are cut off.
 THROUGH_TINT = np.array([1.15, 1.1, 0.55])

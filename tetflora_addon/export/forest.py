@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from ..arrays import Floats, Floats32, Integers, Integers32
 from ..errors import TetFloraError
 from ..files import PART, replace
+from ..optics import FACING
 from .levels import PlantLevel
 
 #: Light from everywhere that surfaces mirror: a row for each roughness, for indices of refraction. Smooth ones by
@@ -28,6 +29,17 @@ _MIRRORED = (
     (0.0, 0.0039, 0.0106, 0.0186, 0.0367),
     (0.0, 0.0018, 0.0055, 0.0101, 0.0211),
 )
+
+
+def leaf_roughness(gloss: float) -> float:
+    """Roughness at which a surface by Fresnel mirrors as much as leaves do, both facing it and on the whole."""
+    amplitude = np.sqrt(FACING * gloss)
+    index = (1.0 + amplitude) / (1.0 - amplitude)
+    mirrored = [np.interp(index, _INDEX, row) for row in _MIRRORED[::-1]]
+    return float(np.interp(gloss, mirrored, _ROUGHNESS[::-1]))
+
+
+CUT = 0.05  # alpha under which leaves are cut out: from afar a texture shows the mean of a cell, mostly under a half
 #: Attributes of points by name, each with its type and values.
 PointAttributes = Mapping[str, tuple[str, NDArray]]
 

@@ -83,26 +83,23 @@ def levels_of(flora: Flora, seed: Seeds, number: int = 0, like: tuple[PlantLevel
     number : int
         Levels, with the full one; 0 for as many as suit the plant, three to six.
     like : tuple of PlantLevel, optional
-        Levels of another plant of the same kind, whose sizes of pixels hold, and whose second level is as much larger;
-        all is measured if there are none.
+        Levels of another plant of the same kind, whose sizes of pixels hold, and with whose areas corrections begin.
     """
     grown = list(expand(flora, trunks(flora.rows, replace(seed, scale=np.ones(1), position=np.zeros((1, 3))))))
     back = seed.frame[0].astype(np.float32)
     full = PlantLevel(_parts(flora, grown, back), 0.0)
     if len(like) > 1:
-        # Of many leaves, corrections are those of all plants of the kind; few are seen beside the level of many.
-        near = replace(like[1], parts=_changed(_parts(flora, grown, back, like[1].pixel), like[1].larger, like[1].tint))
-        grids = _grids(near, like[1].pixel * _LONG, like[-1].pixel)
-        truth = _views(grids, near.parts)
-        rest = (_corrected(flora, grown, back, one.pixel, grids, truth, np.log(one.larger)) for one in like[2:])
-        return (full, near, *rest)
-    leaf, count = _leaves(flora, grown)
-    first, last = leaf / _LONG, leaf / _LONG * np.sqrt(max(count / _LAST, 4.0))
-    steps = number - 1 if number else int(np.clip(round(np.log2(last / first)), _FEWEST, _MOST))
-    pixels = first * (last / first) ** (np.arange(1, steps + 1) / max(steps, 1))
-    grids = _grids(full, leaf, pixels[-1] if steps else leaf)
-    truth = _views(grids, full.parts)
-    return (full, *(_corrected(flora, grown, back, pixel, grids, truth) for pixel in pixels.tolist()))
+        leaf, pixels = like[1].pixel * _LONG, [one.pixel for one in like[1:]]
+        sizes = [float(np.log(one.larger)) for one in like[1:]]
+    else:
+        leaf, count = _leaves(flora, grown)
+        first, last = leaf / _LONG, leaf / _LONG * np.sqrt(max(count / _LAST, 4.0))
+        steps = number - 1 if number else int(np.clip(round(np.log2(last / first)), _FEWEST, _MOST))
+        pixels = (first * (last / first) ** (np.arange(1, steps + 1) / max(steps, 1))).tolist()
+        sizes = [0.0] * steps
+    grids = _grids(full, leaf, pixels[-1] if pixels else leaf)
+    truth, each = _views(grids, full.parts), zip(pixels, sizes, strict=True)
+    return (full, *(_corrected(flora, grown, back, pixel, grids, truth, size) for pixel, size in each))
 
 
 def differences(levels: Sequence[PlantLevel]) -> tuple[PlantLevel, ...]:

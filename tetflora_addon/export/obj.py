@@ -68,6 +68,4 @@ def _write_materials(path: Path, forest: Forest) -> None:
         lines += [f"newmtl {surface.name}", f"Kd {color}", "Ks 0 0 0", f"Pr {surface.roughness:.3f}"]
         named = (("map_Kd", "color"), ("norm", "normal"), ("map_Pr", "roughness"))
         lines += [f"{key} {surface.textures[name]}" for key, name in named if name in surface.textures]
-        if surface.sided and "color" in surface.textures:
-            lines.append(f"map_d -imfchan m {surface.textures['color']}")
     path.write_text("\n".join(lines) + "\n", encoding="utf-8")

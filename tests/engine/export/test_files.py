@@ -15,12 +15,21 @@ from PIL import Image
 
 from tetflora_addon.compiled.flora import compile_species
 from tetflora_addon.errors import TetFloraError
-from tetflora_addon.export.forest import BakedSurface, Forest, ForestPart, Variant, identifiers, written_whole
+from tetflora_addon.export.forest import (
+    BakedSurface,
+    Forest,
+    ForestPart,
+    Variant,
+    identifiers,
+    leaf_roughness,
+    written_whole,
+)
 from tetflora_addon.export.gltf import write_gltf
 from tetflora_addon.export.images import LEAVES, TEXELS, atlas, halved, in_atlas, outline, palette_of, png, tiled
 from tetflora_addon.export.levels import levels_of
 from tetflora_addon.export.obj import write_obj
 from tetflora_addon.growth.seeds import Seeds
+from tetflora_addon.optics import FACING
 from tetflora_addon.species.catalog import load_species
 
 NUMBER = 7
@@ -91,6 +100,12 @@ def test_rough_surfaces_mirror_as_much_by_a_larger_index():
     assert 1.0 < smooth < 1.1
     assert rough == pytest.approx(1.2)
     assert BakedSurface("bark", (0.1, 0.1, 0.1), roughness=0.9).index == 1.0
+
+
+@pytest.mark.parametrize("gloss", [0.01, 0.02, 0.04])
+def test_leaves_mirror_as_much_facing_the_eye_by_their_roughness(gloss):
+    leaf = BakedSurface("leaf", (0.1, 0.2, 0.05), gloss=gloss, roughness=leaf_roughness(gloss))
+    assert ((leaf.index - 1.0) / (leaf.index + 1.0)) ** 2 == pytest.approx(FACING * gloss, rel=0.05)
 
 
 def test_gltf_has_the_surface_of_each_level(forest, tmp_path):

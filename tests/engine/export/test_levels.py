@@ -65,7 +65,7 @@ def test_levels_cover_as_much_in_the_same_color_and_outline(bush):
         assert abs(level.cover) < 0.02
         assert level.color < 0.03
         assert level.outline < 1.5
-    # Corrections of one plant hold for others of its kind, wherever they look to.
+    # Another plant of the kind begins with its corrections, wherever it looks to.
     turned = replace(
         Seeds.upright(1), seed=np.array([77]), frame=np.array([[[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0, 0, 1]]])
     )
@@ -85,3 +85,12 @@ def test_a_plant_without_leaves_has_levels():
     levels = levels_of(flora, Seeds.upright(1), 3)
     polygons = [level.polygons for level in levels]
     assert polygons == sorted(polygons, reverse=True) and polygons[-1] > 0
+
+
+def test_levels_of_another_plant_cover_as_much_as_that_does():
+    """Plants of a kind hide their wood and each other's leaves to different degrees."""
+    fern, plants = compile_species([load_species("fern")]), Seeds.upright(2)
+    like = levels_of(fern, plants.take(slice(0, 1)))
+    _, *levels = differences(levels_of(fern, plants.take(slice(1, 2)), 0, like))
+    assert [level.pixel for level in levels] == [level.pixel for level in like[1:]]
+    assert all(abs(level.cover) < 0.02 and level.color < 0.03 for level in levels)

@@ -62,3 +62,26 @@ def test_all_levels_have_the_sides_of_the_first():
     levels.append(PlantLevel((("leaf", replace(leaf, positions=leaf.positions[:, [2, 1, 0]])),), 1.0))
     near, far = (level.parts[0][1].attributes["tf_color"][1] for level in opaque(levels, sides_of(levels)))
     np.testing.assert_array_equal(near, far)
+
+
+def test_leaves_that_hang_show_the_same_to_all_sides():
+    """Light and eyes that lay along each other would see more of the lit sides of some."""
+    leaf, found = sheet(PASSED), []
+    upright = leaf.positions[:, [2, 1, 0]]
+    for turn in np.linspace(0.0, np.pi, 7):
+        x, y = np.cos(turn), np.sin(turn)
+        turned = (upright @ np.array([[x, y, 0.0], [-y, x, 0.0], [0.0, 0.0, 1.0]])).astype(np.float32)
+        found.append(recolored(("leaf", replace(leaf, positions=turned)))["leaf"])
+    np.testing.assert_allclose(found, np.tile(COLOR * (1.0 - PASSED + PASSED * THROUGH_TINT), (7, 1)), rtol=0.03)
+
+
+def test_light_that_leaves_send_to_each_other_is_scattered_as_often():
+    """Of what is shaded all light comes from other leaves: what passes through these counts, seen or not."""
+    level, shaded = PlantLevel((("leaf", sheet(PASSED)),), 0.0), 0.6
+    once, often = (
+        opaque([level], {"leaf": np.array([0.5, 0.5, 0.3, part])})[0].parts[0][1].attributes["tf_color"][1][0]
+        for part in (0.0, shaded)
+    )
+    every = COLOR * (1.0 - PASSED + PASSED * THROUGH_TINT)
+    np.testing.assert_allclose(often / (1.0 - shaded * often), once / (1.0 - shaded * every), rtol=1e-5)
+    assert (often > once).all()

@@ -15,7 +15,7 @@ import numpy as np
 
 from ...arrays import Floats, Floats32
 from ...buffers import MeshBuffers
-from ...export.forest import BakedSurface, Variant, identifiers
+from ...export.forest import BakedSurface, Variant, identifiers, leaf_roughness
 from ...export.images import (
     LEAVES,
     TEXELS,
@@ -30,18 +30,17 @@ from ...export.images import (
     tiled,
     within,
 )
+from ...export.levels import corner_triangles
 from ...export.opaque import Sides, opaque, sides_of
 from ...jobs import Job, Progress
-from ...optics import GLOSS, HAIRY
+from ...optics import GLOSS
 from ..attributes import image_pixels, write
+from ..materials.nodes import is_ours
 from ..results.leaf_objects import materials_of
 from ..species.edits import species_for
 
-#: Roughness of what has not been baked.
-_ROUGH = {"bark": 0.9}
-#: What roughness varies by at most where it is a number, not a texture.
-_EVEN = 0.02
-_LEAF = 0.1  # meters to a leaf, for the depth of what is baked
+_BARK = 0.9  # roughness, where it has not been baked
+_EVEN = 0.02  # what roughness varies by where it is a number, and the standard deviation of normals without a relief
 _ABOVE = 4.0  # meters up a trunk where its bark is baked: beyond what is peculiar to its foot
 
 
@@ -119,22 +118,27 @@ def _looks(variants: Sequence[Variant]) -> list[_Look]:
 
 def _surface(scene: bpy.types.Scene, look: _Look, folder: Path, textures: str, bake: bool) -> BakedSurface:
     is_bark = look.part == "bark"
+    gloss = 0.0 if is_bark else GLOSS * (1.0 - look.mean("tf_dull"))
+    rough = _BARK if is_bark else leaf_roughness(gloss)
     images: dict[str, Floats32] = {}
     if bake:
         species = species_for(scene, look.species)
         material = materials_of(scene, species, look.part, 0)[0]
         low = look.palette.low + np.array([0.0, _ABOVE * is_bark])
-        given = (low, look.palette.size, 1.0 if is_bark else _LEAF)
+        given = (low, look.palette.size, 1.0 if is_bark else _meters(look.meshes[0]))
         images = baked(material, look.color, look.mean("tf_transmission"), TEXELS, *given)
         images = {name: tiled(own) if is_bark else within(own) for name, own in images.items()}
-    roughness = images.pop("roughness", np.full(1, _ROUGH.get(look.part, 0.5)))
+        if is_bark or not is_ours(material):
+            rough = float(images["roughness"].mean())
+        if np.ptp(images["roughness"]) < _EVEN:  # as of TetFlora's own materials
+            del images["roughness"]
+        if images["normal"][..., :2].std() < _EVEN:
+            del images["normal"]
     detail = images.get("color", np.ones((TEXELS, TEXELS, 3), np.float32))
-    shown = None if is_bark else outline(look.palette, look.meshes[0])
+    shown = None if is_bark else np.any([outline(look.palette, mesh) for mesh in look.meshes], axis=0)
     seen = detail.reshape(-1, 3) if shown is None else detail[shown]
     detail = detail / np.maximum(seen.mean(axis=0), 1e-6)
     files = {"color": atlas(look.palette, detail, shown)}
-    if np.ptp(roughness) > _EVEN:  # TetFlora's own materials are evenly rough
-        images["roughness"] = roughness
     for key in images.keys() - files.keys():
         files[key] = np.tile(images[key], (*look.palette.grid[::-1], 1))
     names = {}
@@ -145,9 +149,15 @@ def _surface(scene: bpy.types.Scene, look: _Look, folder: Path, textures: str, b
         half = png(halved(texels), linear=key != "color")
         (folder / textures / f"{look.name}_{key}_half.png").write_bytes(half)
     color = tuple(look.color.tolist())
-    gloss = 0.0 if is_bark else GLOSS * (1.0 - look.mean("tf_dull"))
-    rough = float(roughness.mean()) + (0.0 if is_bark else HAIRY / 2.0)  # of both sides
     return BakedSurface(look.name, color, look.mean("tf_transmission"), rough, gloss, not is_bark, names)
+
+
+def _meters(mesh: MeshBuffers) -> float:
+    """Meters to a unit of texture coordinates: of its faces' edges, so that relief is as deep on them."""
+    corner = corner_triangles(mesh)[1][:, :2]
+    uv, place = mesh.attributes["UVMap"][1][corner], mesh.positions[mesh.corner_verts[corner]]
+    flat, long = (np.linalg.norm(of[:, 1] - of[:, 0], axis=1).sum() for of in (uv, place))
+    return float(long / max(flat, 1e-9))
 
 
 #: What is baked of a material: Blender's name, and whether it is a color.
@@ -169,7 +179,7 @@ def baked(
     low, extent : (2,) float
         Texture coordinates that the square shows.
     meters : float
-        Side of the square.
+        To a unit of texture coordinates.
     """
     found: dict[str, Floats32] = {}
     with _square(material, color, through, low, extent, meters) as (scene, obj):
@@ -199,7 +209,7 @@ def _square(
     obj = bpy.data.objects.new(_NAME, mesh)
     try:
         corners = np.array([(0, 0), (1, 0), (1, 1), (0, 1)], np.float32)
-        mesh.from_pydata(np.pad(meters * corners, ((0, 0), (0, 1))).tolist(), [], [(0, 1, 2, 3)])
+        mesh.from_pydata(np.pad(meters * extent * corners, ((0, 0), (0, 1))).tolist(), [], [(0, 1, 2, 3)])
         for name, uv in (("UVMap", low + corners * extent), ("bake", corners)):
             layer = mesh.uv_layers.new(name=name)
             layer.uv.foreach_set("vector", np.ascontiguousarray(uv, np.float32).reshape(-1))

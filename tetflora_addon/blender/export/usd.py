@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from ...arrays import Integers
 from ...buffers import MeshBuffers
 from ...errors import SceneError, TetFloraError, listed
-from ...export.forest import BakedSurface, Forest, ForestPart, PointAttributes, Variant, identifiers
+from ...export.forest import CUT, BakedSurface, Forest, ForestPart, PointAttributes, Variant, identifiers
 from ...export.gltf import vertex_normals
 from ...growth.hashing import child_key, key_of_seed, uniform
 from ...jobs import Progress
@@ -251,7 +251,7 @@ def _write_texture(
         image.CreateInput("scale", types.Float4).Set(pxr.Gf.Vec4f(2.0, 2.0, 2.0, 1.0))
         image.CreateInput("bias", types.Float4).Set(pxr.Gf.Vec4f(-1.0, -1.0, -1.0, 0.0))
     if name == "color":  # outlines are cut out, not blended
-        shader.CreateInput("opacityThreshold", types.Float).Set(0.5)
+        shader.CreateInput("opacityThreshold", types.Float).Set(CUT)
     for key, output, of in inputs[name]:
         image.CreateOutput(output, types.Float if len(output) == 1 else types.Float3)
         shader.CreateInput(key, of).ConnectToSource(image.ConnectableAPI(), output)

@@ -14,7 +14,7 @@ from typing import Any
 
 import bpy
 
-from ...optics import GLOSS, HAIRY, PALER, THROUGH_TINT
+from ...optics import FACING, GLOSS, HAIRY, PALER, THROUGH_TINT
 from .nodes import LEAF_GREEN, Graph, Term, node_group
 
 # Raise this when nodes or numbers change; `blade_version` then makes new materials as well.
@@ -25,9 +25,9 @@ UNIT = (0.0, 1.0)
 GLOSSIER = 0.1
 #: Roughness of the upper side's gloss where no blade says otherwise.
 WAXY = 0.5
-#: What of `GLOSS` is mirrored at all angles, and how much is added at a grazing one: g (a + b (1 - cos)^5), whose mean
-#: over all directions is g, as the cosine-weighted mean of (1 - cos)^5 is 1/21.
-_FACING, _GRAZING = 0.85, 0.15 * 21.0
+#: How much of `GLOSS` is added at a grazing angle: g (a + b (1 - cos)^5), whose mean over all directions is g, as the
+#: cosine-weighted mean of (1 - cos)^5 is 1/21.
+_GRAZING = (1.0 - FACING) * 21.0
 #: What veins add to red, green and blue in reflected light, and when the sun is behind: they hold less chlorophyll.
 _VEIN_HUE = (1.15, 1.0, 1.0)
 _THROUGH_HUE = (1.3, 1.0, 0.4)
@@ -163,7 +163,7 @@ def paler(side: Term) -> Term:
 def sheen(graph: Graph, side: Term, gloss: Term) -> Term:
     """What a side of leaves mirrors as they are seen, from what leaves mirror on the mean."""
     facing = graph.outputs("ShaderNodeLayerWeight", {"Blend": 0.5})["Facing"]
-    return (side * -GLOSSIER + 1.0) * gloss * (facing**5.0 * _GRAZING + _FACING)
+    return (side * -GLOSSIER + 1.0) * gloss * (facing**5.0 * _GRAZING + FACING)
 
 
 def _venation(graph: Graph, given: dict[str, Term], blade: BladeLook) -> dict[str, Term]:
