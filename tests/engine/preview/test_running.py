@@ -57,7 +57,8 @@ def test_what_is_shown_covers_as_much_where_anything_is_seen_through(seeds: Seed
         assert len(kept) < 3_300
         some = np.flatnonzero(np.bincount(found.part, minlength=len(every)) > 300)  # others are too few to be even
         expected = np.minimum(every, running.LAYERS)[some]
-        np.testing.assert_allclose(cover(found, areas, kept)[some], expected, rtol=0.35)
+        # By chance: of 60 m² each some forty stay in a part.
+        np.testing.assert_allclose(cover(found, areas, kept)[some], expected, rtol=0.5)
 
 
 def test_as_plants_grow_the_same_ones_stay_and_fewer_are_needed(seeds: Seeds) -> None:

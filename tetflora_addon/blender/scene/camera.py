@@ -258,7 +258,7 @@ def timeline_moves() -> bool:
     return any(screen.is_animation_playing or screen.is_scrubbing for screen in screens)
 
 
-def views_of(scene: bpy.types.Scene) -> list[NDArray[np.float64]]:
+def views_of(scene: bpy.types.Scene) -> list[Floats]:
     """Matrices (4, 4) from the world to clip space of all viewports that show a scene, as they were last drawn."""
     manager = bpy.context.window_manager
     windows = [window for window in ([] if manager is None else manager.windows) if window.scene == scene]
