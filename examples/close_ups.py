@@ -44,7 +44,7 @@ _SHADOWS = 10.0
 #: Mean of a picture that is well exposed, of its display values.
 _GRAY = 0.34
 #: Width of a picture on the sheet, pixels.
-_CELL = 300
+_CELL = 276
 #: Strength of the sky: bright haze, which opens the shade under crowns.
 _SKY = 0.9
 #: Height of the breast, meters, where foresters measure girth.
