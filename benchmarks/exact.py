@@ -79,6 +79,7 @@ _FACETS = ("proxy", "triangle")
 _SOURCES = (
     *(f"tetflora_addon/{room}" for room in ("catalog", "species", "growth", "leaves", "subplants", "planting")),
     "tetflora_addon/blender/materials",
+    "tetflora_addon/emission/plants.py",
     "benchmarks/exact.py",
     "benchmarks/forest.py",
 )

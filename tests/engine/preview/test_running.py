@@ -51,14 +51,13 @@ def test_few_plants_are_all_shown_as_they_are(seeds: Seeds) -> None:
 
 def test_what_is_shown_covers_as_much_where_anything_is_seen_through(seeds: Seeds) -> None:
     found = running.in_view(seeds, [VIEW])
-    for size in (0.5, 20.0, 60.0):
+    for size in (0.5, 20.0, 30.0):  # of larger ones too few stay in a part to be even
         areas = np.full(len(found.seeds), size)
         every, kept = cover(found, areas, found.seeds), running.shown(found, areas, most=3_000)
         assert len(kept) < 3_300
         some = np.flatnonzero(np.bincount(found.part, minlength=len(every)) > 300)  # others are too few to be even
         expected = np.minimum(every, running.LAYERS)[some]
-        # By chance: of 60 m² each some forty stay in a part.
-        np.testing.assert_allclose(cover(found, areas, kept)[some], expected, rtol=0.5)
+        np.testing.assert_allclose(cover(found, areas, kept)[some], expected, rtol=0.35)
 
 
 def test_as_plants_grow_the_same_ones_stay_and_fewer_are_needed(seeds: Seeds) -> None:
