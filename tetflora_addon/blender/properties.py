@@ -17,7 +17,7 @@ from .results import collection
 from .results.proxy_kinds import proxy_kind_property
 from .runtime import Listeners, classes_in
 from .scene import objects
-from .scene.field_sizes import stored_now
+from .scene.fields import stored_now
 from .scene.skeletons import SKELETON_TYPES
 from .settings import AnimationProperties, RefinementProperties
 from .species import asset_species, editor, edits

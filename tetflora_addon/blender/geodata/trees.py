@@ -32,7 +32,7 @@ from ...species.ages import ages_of
 from ...species.species import Species
 from ..attributes import write
 from ..placing.plant_objects import add_field
-from ..scene.field_sizes import FIT, HEIGHT, NUMBERS, OFFSET, SIZE_ATTRIBUTES
+from ..scene.fields import FIT, HEIGHT, NUMBERS, OFFSET, SIZE_ATTRIBUTES
 from ..species.edits import catalog, grown, species_for
 from ..worker import call_in_thread, steps_in_thread
 from .origin import Import, Imported, Steps, importing

@@ -25,7 +25,7 @@ from ..results.meshes import write_mesh
 from ..results.output import remove_made
 from ..runtime import JobData, is_there, job
 from ..scene.ages import classed
-from ..scene.field_points import stored_ages
+from ..scene.fields import stored_ages
 from ..scene.looks import LIKE, look_like
 from ..scene.skeletons import kind_of
 from ..worker import call_in_thread

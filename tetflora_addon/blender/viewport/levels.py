@@ -41,7 +41,7 @@ from ..runtime import Handlers, JobData, call_off, call_soon, job, redraw
 from ..scene.ages import crown_kinds, plainly_aged
 from ..scene.camera import read_camera, timeline_moves, views_of
 from ..scene.crowns import crown_for
-from ..scene.field_sizes import stand_years
+from ..scene.fields import stand_years
 from ..scene.objects import has_contents, is_drop, taking_part
 from ..scene.plants import NoPlantsError, gone_species, read_asset_plants, read_plants
 from ..settings import season_of, years_of
