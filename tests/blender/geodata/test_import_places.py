@@ -20,7 +20,7 @@ from tests import places_inventories as inventories
 from tests.blender.digests import difference, everything
 from tests.blender.scenes import depsgraph, select
 from tetflora_addon.blender.attributes import read
-from tetflora_addon.blender.geodata import columns, outlines, trees
+from tetflora_addon.blender.geodata import outlines, trees
 from tetflora_addon.blender.geodata.origin import KEY, Import, importing, origin_of
 from tetflora_addon.blender.geodata.terrain import read_raster
 from tetflora_addon.blender.geodata.trees import curves_of
@@ -307,7 +307,7 @@ def test_the_dialog_shows_what_columns_were_taken_for(tmp_path):
             return self[-1]
 
     dialog = SimpleNamespace(table=Rows())
-    columns.show_columns(dialog.table, path)
+    trees.show_columns(dialog.table, path)
     assert [(row.name, row.field, row.values) for row in dialog.table] == [
         ("Art", 'NAME', "Tilia cordata, Acer rubrum"),
         ("top", 'NONE', "30, 40"),
@@ -315,7 +315,7 @@ def test_the_dialog_shows_what_columns_were_taken_for(tmp_path):
         ("y", 'Y', "0, 5"),
     ]
     dialog.table[1].field, dialog.table[1].unit = 'HEIGHT', 'ft'
-    assert json.loads(columns.chosen_columns(dialog.table)) == {"Art": "name", "top": "height ft", "x": "x", "y": "y"}
+    assert json.loads(trees.chosen_columns(dialog.table)) == {"Art": "name", "top": "height ft", "x": "x", "y": "y"}
 
 
 def test_canopy_heights_become_trees(tmp_path):

@@ -19,7 +19,7 @@ from ...growth.seeds import farthest
 from ...species.kinds import species_of
 from ...species.species import Species
 from ..assets.marks import reach_of
-from ..assets.parts import digest_of
+from ..assets.places import digest_of
 from ..compat import drawn_disc
 from ..materials.snow import has_snow
 from ..preferences import preferences

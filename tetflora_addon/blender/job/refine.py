@@ -39,8 +39,7 @@ from ...refinement.loop import Refinement, step_of
 from ...refinement.settings import FIRST_LOOK, RefinementSettings
 from ...refinement.statistics import Statistics, Stopwatch
 from ...species.kinds import Kind
-from ..assets.parts import Target
-from ..assets.places import Places
+from ..assets.places import Places, Target
 from ..compat import drawn_disc
 from ..main_thread import in_main_thread
 from ..materials.materials import baked_material
@@ -56,12 +55,15 @@ from ..runtime import JobData, guarded
 from ..scene.camera import read_camera
 from ..scene.objects import taking_part
 from ..worker import call_in_thread, nobody_waits, run_to_end, steps_in_thread, written
-from .assets import SceneAssets, asset_warnings, bind_steps, is_plain
 from .contents import (
+    SceneAssets,
     SceneContents,
+    asset_warnings,
+    bind_steps,
     check_expanded,
     compile_for,
     in_wind,
+    is_plain,
     load_for,
     memory_left,
     read_scene,

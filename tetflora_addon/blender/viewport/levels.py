@@ -34,8 +34,7 @@ from ...preview.light_plants import (
 )
 from ...preview.running import InView, in_view, shown
 from ...refinement.loop import refine as refine_loop
-from ..job.assets import bind_steps
-from ..job.contents import compile_for, in_year, load_for, memory_left, read_scene, refinement_settings
+from ..job.contents import bind_steps, compile_for, in_year, load_for, memory_left, read_scene, refinement_settings
 from ..main_thread import on_main_thread
 from ..runtime import Handlers, JobData, call_off, call_soon, job, redraw
 from ..scene.ages import crown_kinds, plainly_aged
