@@ -296,20 +296,14 @@ class Target:
                     yield part, *opened
 
 
-def digest_of(target: Target, depsgraph: bpy.types.Depsgraph) -> str:
+def digest_of(target: Target, depsgraph: bpy.types.Depsgraph, parts: list[AssetPart] | None = None) -> str:
     """Hexadecimal digest of all that a target shows: meshes, their attributes, materials and images, and places.
 
     Names of objects do not count, and of images in files only which file it is, how long and how old.
     Errors are those of `Target.parts`.
     """
-    parts, _ = target.parts(depsgraph)
-    return digest_of_parts(parts, depsgraph)
-
-
-def digest_of_parts(parts: list[AssetPart], depsgraph: bpy.types.Depsgraph) -> str:
-    """As `digest_of`."""
     content = hashlib.sha256(str(_VERSION).encode())
-    for part in parts:
+    for part in target.parts(depsgraph)[0] if parts is None else parts:
         with part.opened(depsgraph) as opened:
             if opened is not None:
                 content.update(np.ascontiguousarray(part.matrices))
@@ -362,7 +356,7 @@ def read_source_steps(
     parts, left = target.parts(depsgraph)
     reader = FaceReader()
     reader.warn(left)
-    digest = digest_of_parts(parts, depsgraph)
+    digest = digest_of(target, depsgraph, parts)
     surfaces: list[AssetSurface] = []
     shown: list[AssetPart] = []
     for number, part in enumerate(parts):

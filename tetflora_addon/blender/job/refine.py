@@ -61,7 +61,6 @@ from .contents import (
     asset_warnings,
     bind_steps,
     check_expanded,
-    compile_for,
     in_wind,
     is_plain,
     load_for,
@@ -465,19 +464,6 @@ def _replace(run: _Run) -> None:
 def refine(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, **options: object) -> Statistics:
     """Refine a scene at once; options and errors as for `refine_steps`."""
     return run_to_end(refine_steps(scene, depsgraph, **options))
-
-
-def partition(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> tuple[Camera, Refinement]:
-    """Camera and tetrahedra after refinement, without making anything; for images of the partition.
-
-    Both count from the camera's `origin`. Errors are those of `refine_steps`.
-    """
-    camera = read_camera(scene, depsgraph).local()
-    given = read_scene(scene, depsgraph).counted_from(camera.origin)
-    flora = in_wind(scene, compile_for(given.species, scene, depsgraph), camera)
-    bound = run_to_end(bind_steps(scene, given.places, depsgraph, camera, memory_left(scene, camera)))
-    settings = refinement_settings(scene)
-    return camera, run_to_end(_run_loop(_Run(depsgraph, camera, given, flora=flora, bound=bound, settings=settings)))
 
 
 def clear(scene: bpy.types.Scene, for_render: bool | None = None) -> int:
