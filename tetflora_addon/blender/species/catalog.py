@@ -99,14 +99,9 @@ def number_of(identifier: str) -> int:
 
 
 def items_for(present: str = "", assets: bool = True) -> list[Item]:
-    """Items of an enumeration: the catalog, and the present choice if the catalog does not have it.
+    """Items of an enumeration: the catalog, with or without assets, and the present choice.
 
-    Parameters
-    ----------
-    present : str
-        Identifier that is chosen now; it survives although its file is missing.
-    assets : bool
-        Whether objects that are used as species are among the items.
+    ``present``, the identifier that is chosen now, survives although its file is missing.
     """
     known = catalog() if assets else grown()
     icons = {identifier: icon_of(identifier) for identifier in known}
@@ -189,12 +184,8 @@ def _choose(group: SpeciesChoice, number: int) -> None:
 def gallery_of(entries: str, kind: type[SpeciesChoice]) -> object:
     """A choice that is a button in panels, a plus, and opens a gallery of pictures: what is clicked is added to a list.
 
-    Parameters
-    ----------
-    entries : str
-        Name of the list of species in the group of properties to which this is given.
-    kind : type
-        Class of the list's entries.
+    ``entries`` is the name of the list in the group of properties to which this is given, ``kind`` the class of its
+    entries.
     """
     return once.choice(
         "Add Species",
@@ -260,12 +251,8 @@ def save_species(scene: bpy.types.Scene, identifier: str) -> Path:
 def load_species_file(path: Path, replace: bool = False) -> str:
     """Take a species file into the user's own folder; returns the identifier.
 
-    Parameters
-    ----------
-    path : Path
-        Anywhere; a file that lies in the folder already is only checked.
-    replace : bool
-        Whether an own file of the same name and other content gives way.
+    It may lie anywhere; in the folder already, it is only checked. ``replace``: an own file of the same name and other
+    content gives way.
 
     Raises
     ------
