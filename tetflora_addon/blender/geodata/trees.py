@@ -80,10 +80,7 @@ def chosen_columns(table: Iterable[TetFloraInventoryColumn]) -> str:
 def columns_in(text: str) -> dict[str, str]:
     """What columns hold by their titles, from JSON.
 
-    Raises
-    ------
-    SceneError
-        It is none.
+    Raises `SceneError`: it is none.
     """
     try:
         columns = json.loads(text or "{}")
