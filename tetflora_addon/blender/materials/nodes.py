@@ -123,16 +123,10 @@ class Term:
 
 
 class Graph:
-    """A node tree under construction.
+    """A node tree under construction, emptied first if it is to be fresh.
 
     Sockets are found by identifier or, for the sockets of groups, by name: identifiers stayed the same where 5.x
     renamed "Fac" to "Factor".
-
-    Parameters
-    ----------
-    tree : bpy.types.NodeTree
-    fresh : bool
-        Whether it is emptied first.
     """
 
     def __init__(self, tree: bpy.types.NodeTree, fresh: bool = True) -> None:

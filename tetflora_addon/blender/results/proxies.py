@@ -26,10 +26,7 @@ from .proxy_kinds import ProxyKind, proxy_kind_of
 class Baking:
     """Baked light of one refinement: `add` all polygons, then `add_facets`, then `look`.
 
-    Parameters
-    ----------
-    leaves : bool
-        Whether real leaves, blossoms and bark get baked light as well.
+    ``leaves``: real leaves, blossoms and bark get baked light as well.
     """
 
     def __init__(self, sources: Sources, leaves: bool) -> None:
