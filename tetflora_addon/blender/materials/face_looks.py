@@ -230,10 +230,6 @@ class Plan:
             self.maps.append(name)
         return _ANYWHERE
 
-    def is_map(self, name: str) -> bool:
-        """Whether an attribute holds texture coordinates."""
-        return self.layers.types.get(name) == 'FLOAT2'
-
     def attribute(self, name: str) -> Values:
         """A color attribute (4, p, k)."""
         exists = name in self.layers.types
