@@ -46,7 +46,7 @@ from ..materials.materials import baked_material
 from ..results.collection import Results
 from ..results.hiding import hide_originals, originals_shown, remove_results
 from ..results.instances import add_cluster, add_cluster_instances, add_instances, add_stand_in, carrier_of
-from ..results.leaf_objects import leaf_objects, material_steps
+from ..results.leaf_objects import leaf_objects, materials_of
 from ..results.meshes import AssetMeshes, cluster_mesh_steps, mesh_steps, read_mesh
 from ..results.output import adopt_materials, release_materials, result_collections
 from ..results.proxies import Baking, write_proxies
@@ -253,7 +253,7 @@ def _write_blocks(run: _Run, blocks: Iterator[Block], start: float) -> Job[None]
             if run.baking is not None and run.baking.leaves:
                 materials[what] = [baked_material()]
             else:
-                materials[what] = yield from material_steps(run.results.scene, species, block.kind, block.form)
+                materials[what] = materials_of(run.results.scene, species, block.kind, block.form)
             run.results.use(materials[what])  # from now on, as Esc may come before its first object
         name = f"{species.name} {block.kind} {block.number:03d}"
         yield
