@@ -73,8 +73,6 @@ def is_drop(obj: bpy.types.Object) -> bool:
 #: What nodes instance.
 Reference = bpy.types.Object | bpy.types.Collection | bpy.types.GeometrySet
 
-_PART = 4_096  # matrices of one product
-
 
 @dataclass(frozen=True)
 class Rows:
@@ -89,23 +87,15 @@ class Rows:
         names = child_key(keys[:, None], self.number).reshape(-1)
         if own == 1 and np.array_equal(self.columns[0], np.eye(4)):  # as nodes that bring an object make it
             return matrices, names
-        places = np.zeros((many, own, 4, 4))
-        # A product of two large matrices for each of the fewer, and not one of two small ones for each of the more; in
-        # parts that stay in the processor's cache.
+        # A product of two large matrices for each of the fewer, and not one of two small ones for each of the more.
+        columns = self.columns.astype(np.float64)
         if many <= own:
-            for place, matrix in zip(places, matrices, strict=True):
-                for part in _parts(own):
-                    columns = self.columns[part].reshape(-1, 4).astype(np.float64) @ matrix.T
-                    place[part] = columns.reshape(-1, 4, 4).transpose(0, 2, 1)
+            places = columns.reshape(-1, 4) @ matrices.transpose(0, 2, 1)
+            places = places.reshape(many, own, 4, 4).transpose(0, 1, 3, 2)
         else:
-            for n, columns in enumerate(self.columns.astype(np.float64)):
-                for part in _parts(many):
-                    places[part, n] = (matrices[part].reshape(-1, 4) @ columns.T).reshape(-1, 4, 4)
-        return places.reshape(-1, 4, 4), names
-
-
-def _parts(number: int) -> Iterator[slice]:
-    return (slice(first, first + _PART) for first in range(0, number, _PART))
+            places = matrices.reshape(-1, 4) @ columns.transpose(0, 2, 1)
+            places = places.reshape(own, many, 4, 4).transpose(1, 0, 2, 3)
+        return np.ascontiguousarray(places).reshape(-1, 4, 4), names
 
 
 def references_of(geometry: bpy.types.GeometrySet) -> Iterator[tuple[Reference, Rows]]:
