@@ -13,8 +13,7 @@ from ..tetflora_addon.blender.declare import once
 from ..tetflora_addon.blender.export.usd import ENDINGS as USD_ENDINGS
 from ..tetflora_addon.blender.export.usd import forest_steps
 from ..tetflora_addon.blender.geodata.origin import EXISTING, MIDDLE, WHOLE, Import, Imported, Steps
-from ..tetflora_addon.blender.geodata.outlines import outline_steps
-from ..tetflora_addon.blender.geodata.terrain import PATTERN, terrain_steps
+from ..tetflora_addon.blender.geodata.terrain import PATTERN, outline_steps, terrain_steps
 from ..tetflora_addon.blender.geodata.trees import (
     GENERIC,
     LEFT_OUT,

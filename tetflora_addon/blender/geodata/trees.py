@@ -41,8 +41,7 @@ from ..scene.fields import FIT, HEIGHT, NUMBERS, OFFSET, SIZE_ATTRIBUTES
 from ..species.edits import catalog, grown, species_for
 from ..worker import call_in_thread, steps_in_thread
 from .origin import Import, Imported, Steps, importing
-from .outlines import building_areas
-from .terrain import heights_steps, read_raster
+from .terrain import building_areas, heights_steps, read_raster
 
 _UNITS = ("Meters", "Centimeters", "Millimeters", "Feet", "Inches")
 
