@@ -143,7 +143,12 @@ def read_arrays(path: Path, most: int, checked: Callable[[Mapping[str, NDArray]]
 
 
 def refuse_packed(content: bytes, most: int) -> None:
-    """Refuse, by a `ValueError`, an archive that would take more memory than it has bytes: ours are not compressed."""
+    """Refuse an archive that would take more memory than it has bytes: ours are not compressed, and say their size.
+
+    Raises
+    ------
+    ValueError
+    """
     with zipfile.ZipFile(io.BytesIO(content)) as archive:
         for info in archive.infolist():
             if info.compress_type != zipfile.ZIP_STORED or info.file_size > most:
@@ -220,9 +225,13 @@ Arrays = tuple[NDArray, ...]
 def memoized(most_bytes: int) -> Callable[[Callable[..., Arrays]], Callable[..., Arrays]]:
     """Decorator for functions that take arrays alone, and give arrays that follow from these alone.
 
-    Results are read only, for all who ask for the same get the same arrays. All of a function together take so many
-    bytes: what nobody has asked for longest goes first; what is too large for the limit by itself is given, not kept,
-    and makes nothing else go.
+    Results are read only, for all who ask for the same get the same arrays. What nobody has asked for longest goes
+    first; what is too large for the limit by itself is given, not kept, and makes nothing else go.
+
+    Parameters
+    ----------
+    most_bytes : int
+        That all results of the function together take.
     """
 
     def decorated(function: Callable[..., Arrays]) -> Callable[..., Arrays]:

@@ -104,8 +104,20 @@ def _read_one(mesh: bpy.types.Mesh, materials: list[bpy.types.Material | None], 
 def measure(variants: Iterable[tuple[Target, Floats]], depsgraph: bpy.types.Depsgraph) -> dict[str, Any]:
     """Means over the variants of a species, by the properties of `TetFloraAssetSpecies`, and a picture of the first.
 
-    Variants are targets, each with the matrix (4, 4) from its space to that of the plant. Empty where nothing has a
-    face. Raises `SceneError`: something instances itself.
+    Parameters
+    ----------
+    variants : iterable
+        Targets, each with the matrix (4, 4) from its space to that of the plant.
+
+    Returns
+    -------
+    dict
+        Empty where nothing has a face.
+
+    Raises
+    ------
+    SceneError
+        Something instances itself.
     """
     found, looks = [], Looks()
     for target, matrix in variants:

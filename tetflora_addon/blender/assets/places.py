@@ -334,9 +334,21 @@ def read_source_steps(
 ) -> Generator[float, None, tuple[AssetSource, tuple[str, ...]]]:
     """Read all surfaces of an asset; yields the fraction that is done.
 
-    Between two steps the dependency graph may be evaluated again, but must be there. Returns warnings for the artist
-    too: images that are missing, materials without shaders, and what is left out. Raises `SceneError`: the asset has no
-    faces, has vertices that are not finite numbers, or instances itself; the message names it.
+    Parameters
+    ----------
+    depsgraph : bpy.types.Depsgraph
+        Between two steps it may be evaluated again, but must be there.
+
+    Returns
+    -------
+    AssetSource
+    tuple of str
+        Warnings for the artist: images that are missing, materials without shaders, and what is left out.
+
+    Raises
+    ------
+    SceneError
+        The asset has no faces, has vertices that are not finite numbers, or instances itself; the message names it.
     """
     parts, left = target.parts(depsgraph)
     reader = FaceReader()
@@ -434,9 +446,16 @@ class Places:
 def read_places(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> list[Places]:
     """Places of all assets of a view layer that render: first of plants, then of objects that scatter, by name.
 
-    The dependency graph shows originals, as `results.hiding.originals_shown` lets it. Raises `SceneError`: a transform
-    that is not a number, a species whose collection has no object with faces, or a marked object of a kind that cannot
-    be read; the message names the object.
+    Parameters
+    ----------
+    depsgraph : bpy.types.Depsgraph
+        In which originals are shown, as `results.hiding.originals_shown` does.
+
+    Raises
+    ------
+    SceneError
+        A transform that is not a number, a species whose collection has no object with faces, or a marked object of a
+        kind that cannot be read; the message names the object.
     """
     found = plant_places(scene, depsgraph)
     marked = sorted((o for o in renderable_objects(depsgraph.view_layer) if is_scatter(o)), key=lambda o: o.name_full)

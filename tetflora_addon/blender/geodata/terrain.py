@@ -57,7 +57,12 @@ _FINEST, _MOST_CELLS = 0.5, 4_000_000  # of the grid that heights are read from:
 def read_raster(order: Import, path: Path | None = None) -> Job[Raster]:
     """Read the raster of an import, its tiles as one; yields progress. ``path``: another file, whole, in its place.
 
-    Raises `OSError`: one cannot be read. Raises `SceneError`: one is broken, or lacks a place.
+    Raises
+    ------
+    OSError
+        One cannot be read.
+    SceneError
+        One is broken, or lacks a place.
     """
     tiles, paths, code = [], [order.path, *order.tiles] if path is None else [path], order.epsg
     for path in paths:

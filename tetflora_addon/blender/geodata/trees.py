@@ -233,9 +233,21 @@ def _species(inventory: Inventory, unknown: str) -> tuple[list[str], Integers32,
 def canopy_steps(order: Import, mix: Mapping[str, float], least: float, below: Path | None = None) -> Steps:
     """Make a field of the trees that a raster of canopy height shows; yields progress.
 
-    ``mix`` has weights of species by identifier; ``least`` is the height of the smallest tree, meters; ``below`` has
-    elevations of the ground, which are subtracted. Closing the steps leaves all as it was. A file that is broken, has
-    no trees, or cannot lie in this scene, is a `SceneError`.
+    Closing the steps leaves all as it was.
+
+    Parameters
+    ----------
+    mix : mapping
+        Weights of species by identifier.
+    least : float
+        Height of the smallest tree, meters.
+    below : Path, optional
+        Elevations of the ground, which are subtracted.
+
+    Raises
+    ------
+    SceneError
+        The file is broken, has no trees, or cannot lie in this scene.
     """
     raster, what = (yield from read_raster(order)), order.what
     if below is not None:

@@ -81,9 +81,17 @@ def plant_mesh(scene: bpy.types.Scene, name: str, species: Species, parts: list[
 def make_plant_mesh_steps(data: JobData, plants: Iterable[bpy.types.Object]) -> Job[list[bpy.types.Object]]:
     """Make ordinary mesh objects of plants, in their places and collections; the plants are disabled, not deleted.
 
-    A step for each plant; closing the generator early removes what was made. Returns the objects in the order of the
-    plants, each with a mesh of its own. Raises `TetFloraError`: an invalid species or transform, or too many polygons;
-    nothing is made.
+    A step for each plant; closing the generator early removes what was made.
+
+    Returns
+    -------
+    list of bpy.types.Object
+        In the order of the plants, each with a mesh of its own.
+
+    Raises
+    ------
+    TetFloraError
+        An invalid species or transform, or too many polygons; nothing is made.
     """
     scene, depsgraph, plants = data.scene, data.depsgraph, list(plants)
     data.add_objects([*plants, *leaf_objects(scene).values()])

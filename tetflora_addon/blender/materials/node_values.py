@@ -221,9 +221,14 @@ _UNLIT = Scattered(_ONE, _BLACK, _NONE)
 
 
 class NodeValues:
-    """Evaluates a material at some points: the one that stands for all of a `Plan`, or points (p, k) of k triangles.
+    """Evaluates a material at some points.
 
-    Ramps and curves are kept as tables, by `settings_of`, from one call to the next.
+    Parameters
+    ----------
+    points : face_looks.Plan
+        Of the material: its one point that stands for all, or points (p, k) of k triangles.
+    curves : dict
+        Ramps and curves as tables, by `settings_of`; kept from one call to the next.
     """
 
     def __init__(self, points: Any, curves: dict[str, Floats32]) -> None:

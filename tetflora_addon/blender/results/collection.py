@@ -48,9 +48,15 @@ class Results:
     """A result collection under construction.
 
     The artist's is linked to the scene at once, so that an object is seen as soon as it is made. That of a render is
-    filled and linked when it is finished: see `main_thread`. `discard` removes everything. ``mark`` is a suffix of all
-    names, where there are results of several cameras at the same time; the job of ``data`` ends when somebody deletes
-    its results.
+    filled and linked when it is finished: see `main_thread`. `discard` removes everything.
+
+    Parameters
+    ----------
+    purpose : {'VIEW', 'RENDER'}
+    mark : str
+        Suffix of all names, where there are results of several cameras at the same time.
+    data : JobData, optional
+        Of the job, which ends when somebody deletes its results.
     """
 
     def __init__(self, scene: bpy.types.Scene, purpose: str, mark: str = "", data: JobData | None = None) -> None:

@@ -26,7 +26,10 @@ from .proxy_kinds import ProxyKind, proxy_kind_of
 class Baking:
     """Baked light of one refinement: `add` all polygons, then `add_facets`, then `look`.
 
-    ``leaves``: real leaves, blossoms and bark get baked light as well.
+    Parameters
+    ----------
+    leaves : bool
+        Whether real leaves, blossoms and bark get baked light as well.
     """
 
     def __init__(self, sources: Sources, leaves: bool) -> None:

@@ -38,9 +38,12 @@ def read_lights(depsgraph: bpy.types.Depsgraph) -> tuple[Light, ...]:
     """Lights that render and shine, by name.
 
     Instances of lights and lights with an invalid transform are left out. Light linking, textures and the spread of
-    areas do not count; of nodes, strength and color of the emission do where they are plain numbers. Energies are as
-    Cycles takes them, measured on a white plane within .1 %: a sun's is its irradiance; a point or spot of Φ watts
-    sends Φ / 4π W/sr each way, an area Φ / π W/sr ahead.
+    areas do not count; of nodes, strength and color of the emission do where they are plain numbers.
+
+    Notes
+    -----
+    Energies are as Cycles takes them, measured on a white plane within .1 %: a sun's is its irradiance; a point or spot
+    of Φ watts sends Φ / 4π W/sr each way, an area Φ / π W/sr ahead.
     """
     found = []
     for obj in sorted(renderable_objects(depsgraph.view_layer), key=lambda o: o.name_full):
@@ -103,6 +106,8 @@ class WorldLight:
 def read_world(scene: bpy.types.Scene) -> WorldLight:
     """Light of a scene's world; black without one.
 
+    Notes
+    -----
     Of a mapping the turn about the vertical counts. Air, dust and turbidity of skies count as their defaults.
     """
     world = scene.world
