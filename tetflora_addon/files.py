@@ -44,7 +44,10 @@ def is_identifier(text: str) -> bool:
 def path_in(folder: Path, name: str) -> Path:
     """The path of a file right in a folder.
 
-    Raises `OSError`: the name leads anywhere else.
+    Raises
+    ------
+    OSError
+        The name leads anywhere else.
     """
     path = folder / name
     _refuse_nul(path)
@@ -65,7 +68,10 @@ def is_regular(path: Path) -> bool:
 def read_whole(path: Path, most: int) -> bytes:
     """The content of a regular file; one of more than ``most`` bytes is not read.
 
-    Raises `OSError`: it cannot be read, is too large, or is a link, folder, pipe or device.
+    Raises
+    ------
+    OSError
+        It cannot be read, is too large, or is a link, folder, pipe or device.
     """
     _refuse_nul(path)
     before = os.lstat(path)
@@ -86,7 +92,12 @@ def write_whole(path: Path, content: bytes | str) -> None:
     """Write a file beside its place and then put it there; text becomes UTF-8.
 
     Readers in other processes see the old file or the new one, never a part of either. A link is replaced, and what it
-    leads to stays as it is. Raises `OSError`: it cannot be written; an earlier file stays as it was.
+    leads to stays as it is.
+
+    Raises
+    ------
+    OSError
+        It cannot be written; an earlier file stays as it was.
     """
     _refuse_nul(path)
     part = path.with_name(uuid.uuid4().hex.join(PART))
@@ -105,7 +116,10 @@ def write_whole(path: Path, content: bytes | str) -> None:
 def replace(part: Path, path: Path) -> None:
     """Put a file in the place of another one; on Windows wait a moment for whoever has that open, as virus scanners do.
 
-    Raises `OSError`: it cannot be put there.
+    Raises
+    ------
+    OSError
+        It cannot be put there.
     """
     for wait in (*_WAITS, None):
         try:
@@ -121,9 +135,12 @@ def parse_json(content: bytes | str, constant: Callable[[str], float] = float) -
     """Decode JSON of which every part is a Python value that texts and floats can hold.
 
     Integers beyond floats become infinite, so that whoever checks a number refuses it by the name of its key.
-    ``constant`` makes numbers of ``NaN``, ``Infinity`` and ``-Infinity``, which JSON does not have. Raises
-    `ValueError`: it is no JSON, or a key comes twice in an object: Python's reader would take the last one and say
-    nothing.
+    ``constant`` makes numbers of ``NaN``, ``Infinity`` and ``-Infinity``, which JSON does not have.
+
+    Raises
+    ------
+    ValueError
+        It is no JSON, or a key comes twice in an object: Python's reader would take the last one and say nothing.
     """
     try:
         # Some editors begin a file with a mark of its encoding.

@@ -144,7 +144,10 @@ def size_of(variants: Iterable[tuple[Target, Floats]], depsgraph: bpy.types.Deps
 def reach_of(target: Target, depsgraph: bpy.types.Depsgraph) -> float:
     """Distance from an asset's origin within which all of it lies, meters in its own space.
 
-    Raises `SceneError`: it instances itself.
+    Raises
+    ------
+    SceneError
+        It instances itself.
     """
     boxes = [np.linalg.norm(_corners(*box), axis=-1).max() for box in _boxes(target, depsgraph)]
     return float(max(boxes, default=0.0))
@@ -355,7 +358,10 @@ def is_species(datablock: Datablock | None) -> bool:
 def scattered(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Scatter:
     """What an object scatters.
 
-    Raises `SceneError`: nothing that has faces, or as `places.read_scatters`; the message says what to do.
+    Raises
+    ------
+    SceneError
+        Nothing that has faces, or as `places.read_scatters`; the message says what to do.
     """
     found = read_scatters([obj], depsgraph)[obj]
     if not found.places:

@@ -279,7 +279,10 @@ class Target:
     def parts(self, depsgraph: bpy.types.Depsgraph) -> tuple[list[AssetPart], list[str]]:
         """What it consists of, and warnings of what is left out.
 
-        Raises `SceneError`: something instances itself; the message names it.
+        Raises
+        ------
+        SceneError
+            Something instances itself; the message names it.
         """
         walk = _Parts(self.name, depsgraph)
         walk.take(self.shown, np.eye(4)[None])
@@ -487,7 +490,10 @@ Variant = tuple[Target, Floats]
 def variants_of(entry: TetFloraAssetSpecies, depsgraph: bpy.types.Depsgraph) -> list[Variant]:
     """What plants of a species look like: each target with the matrix (4, 4) from its space to that of the plant.
 
-    Raises `SceneError`: nothing of it has faces.
+    Raises
+    ------
+    SceneError
+        Nothing of it has faces.
     """
     if entry.object is not None:
         return [_as_it_stands(entry.object, depsgraph)]
@@ -533,7 +539,10 @@ def _by_variant(plants: AssetPlants, variants: list[Variant]) -> list[Places]:
 def read_scatters(objects: list[bpy.types.Object], depsgraph: bpy.types.Depsgraph) -> "dict[bpy.types.Object, Scatter]":
     """What each of some original objects scatters.
 
-    Raises `SceneError`: a transform that is not a number; the message names the object.
+    Raises
+    ------
+    SceneError
+        A transform that is not a number; the message names the object.
     """
     found, slow = {}, []
     for obj in objects:
@@ -552,7 +561,10 @@ def read_scatters(objects: list[bpy.types.Object], depsgraph: bpy.types.Depsgrap
 def shows_faces(target: Target, depsgraph: bpy.types.Depsgraph) -> bool:
     """Whether a target has any face.
 
-    Raises `SceneError`: it instances itself; the message names what does.
+    Raises
+    ------
+    SceneError
+        It instances itself; the message names what does.
     """
     return any(True for _ in target.meshes(depsgraph))
 

@@ -33,7 +33,10 @@ WHOLE, MIDDLE, EXISTING = 'WHOLE', 'MIDDLE', 'EXISTING'
 def origin_of(scene: bpy.types.Scene) -> MapOrigin | None:
     """The place of a scene; None before its first import.
 
-    Raises `SceneError`: what is stored cannot be a place.
+    Raises
+    ------
+    SceneError
+        What is stored cannot be a place.
     """
     stored = scene.get(KEY)
     if stored is None:

@@ -79,7 +79,10 @@ def chosen_columns(table: Iterable[TetFloraInventoryColumn]) -> str:
 def columns_in(text: str) -> dict[str, str]:
     """What columns hold by their titles, from JSON.
 
-    Raises `SceneError`: it is none.
+    Raises
+    ------
+    SceneError
+        It is none.
     """
     try:
         columns = json.loads(text or "{}")

@@ -131,7 +131,10 @@ def expected_polygons(flora: Flora, seeds: Seeds) -> float:
 def read_scene(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> SceneContents:
     """Read everything that takes part in refinement except the camera.
 
-    Raises `TetFloraError`: nothing to refine, or unusable plants or meshes; the message says which.
+    Raises
+    ------
+    TetFloraError
+        Nothing to refine, or unusable plants or meshes; the message says which.
     """
     check_settings(scene)
     with originals_shown(scene, depsgraph):
@@ -156,8 +159,12 @@ def compile_for(identifiers: tuple[str, ...], scene: bpy.types.Scene, depsgraph:
     """Load and compile species, leaf objects of the scene included.
 
     Without any, for meshes alone, it is a shipped one of which nothing grows: the artist's own files and edits that the
-    scene does not use must not take time or raise errors. Raises `SpeciesError`: unknown or broken species, or a leaf
-    object that is missing or not a mesh with faces.
+    scene does not use must not take time or raise errors.
+
+    Raises
+    ------
+    SpeciesError
+        Unknown or broken species, or a leaf object that is missing or not a mesh with faces.
     """
     return compile_species(load_for(identifiers, scene, depsgraph))
 
@@ -203,7 +210,10 @@ def estimate(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> Statisti
 def check_settings(scene: bpy.types.Scene) -> None:
     """Refuse settings of a scene that are beyond their limits.
 
-    Raises `SceneError`: names the setting, its value and the limits.
+    Raises
+    ------
+    SceneError
+        Names the setting, its value and the limits.
     """
     for group in (scene.tetflora, scene.tetflora.wind, scene.tetflora.year, scene.tetflora.output):
         check_limits(group, f'Scene "{scene.name}"')
@@ -324,7 +334,10 @@ def bind_steps(
 ) -> Job[SceneAssets | None]:
     """Compile the assets of places, which count from the camera's origin; None where there are none.
 
-    Raises `TetFloraError`: an asset that cannot be compiled; the message names it.
+    Raises
+    ------
+    TetFloraError
+        An asset that cannot be compiled; the message names it.
     """
     asset_warnings.clear()
     if not places:

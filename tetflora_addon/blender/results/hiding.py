@@ -57,7 +57,10 @@ def is_switched(obj: bpy.types.Object) -> bool:
 def check_linked(scene: bpy.types.Scene, originals: Sequence[bpy.types.Object]) -> None:
     """See whether `hide_linked` can hide objects.
 
-    Raises `SceneError`: it cannot hide one; the message names it and says what to do.
+    Raises
+    ------
+    SceneError
+        It cannot hide one; the message names it and says what to do.
     """
     known = {o for purpose in HIDDEN_LINKED for other in bpy.data.scenes for o in linked_hidden(other, purpose)}
     homes = _collections(scene)
@@ -75,7 +78,10 @@ def check_linked(scene: bpy.types.Scene, originals: Sequence[bpy.types.Object]) 
 def hide_linked(scene: bpy.types.Scene, purpose: str, originals: Sequence[bpy.types.Object]) -> None:
     """Hide linked objects too.
 
-    Raises `SceneError`: as `check_linked`, before anything is hidden.
+    Raises
+    ------
+    SceneError
+        As `check_linked`, before anything is hidden.
     """
     hidden = linked_hidden(scene, purpose)
     wanted = list(dict.fromkeys([*hidden, *originals]))
@@ -190,7 +196,10 @@ OVERRIDES = "tetflora_hidden_overrides"
 def hide_originals(scene: bpy.types.Scene, purpose: str, originals: Sequence[bpy.types.Object]) -> None:
     """Hide objects that results replace, in viewports too unless the results are only for a render.
 
-    Raises `SceneError`: one is linked in such a way that it cannot be hidden: see `check_linked`. None is hidden then.
+    Raises
+    ------
+    SceneError
+        One is linked in such a way that it cannot be hidden: see `check_linked`. None is hidden then.
     """
     apart = [original for original in originals if original.library is not None or is_switched(original)]
     hide_linked(scene, purpose, apart)

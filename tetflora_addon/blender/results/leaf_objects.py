@@ -142,8 +142,10 @@ def leaf_objects(scene: bpy.types.Scene) -> dict[str, bpy.types.Object]:
 def resolved_species(scene: bpy.types.Scene, kind_of_plant: str, depsgraph: bpy.types.Depsgraph) -> Species:
     """A species of a kind of plant with polygons and a skeleton in place of the names of objects.
 
-    Raises `SpeciesError`: unknown or broken species, an object that is missing or not a mesh with faces, or a form
-    without edges.
+    Raises
+    ------
+    SpeciesError
+        Unknown or broken species, an object that is missing or not a mesh with faces, or a form without edges.
     """
     identifier, form = species_of(kind_of_plant), skeleton_object_of(kind_of_plant)
     species = species_for(scene, identifier)

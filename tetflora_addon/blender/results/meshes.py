@@ -40,8 +40,13 @@ def write_mesh(name: str, buffers: MeshBuffers, materials: Sequence[bpy.types.Ma
 
     Topology is copied, edges included, so that Blender computes nothing; where buffers have none it finds them.
     Positions and indices are written through the mesh's attributes, which are plain memory; the collections
-    ``vertices`` and ``loops`` are many times slower. Raises `ValueError`: arrays of wrong shape or type, or indices out
-    of range, with which Blender would crash later; no datablock is left behind.
+    ``vertices`` and ``loops`` are many times slower.
+
+    Raises
+    ------
+    ValueError
+        Arrays of wrong shape or type, or indices out of range, with which Blender would crash later; no datablock is
+        left behind.
     """
     return run_to_end(mesh_steps(name, buffers, materials))
 

@@ -126,7 +126,10 @@ def proxy_kind_property() -> object:
 def register_proxy_kind(form: ProxyKind) -> None:
     """Add a form to the setting Proxies, for scripts and other add-ons.
 
-    Raises `ValueError`: its identifier or number is taken.
+    Raises
+    ------
+    ValueError
+        Its identifier or number is taken.
     """
     taken = [other.label for other in forms() if {other.identifier, other.number} & {form.identifier, form.number}]
     if taken:

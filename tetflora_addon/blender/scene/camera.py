@@ -28,8 +28,12 @@ def read_camera(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, region_o
     taken without scale and shear, as renderers do. Panoramas other than equirectangular ones count as images of the
     whole sphere with the same number of pixels per angle, or narrow fisheyes as a part of it. Stereo counts as
     movement: the view is as wide as both eyes need. ``region_only``: of the render region, if there is one; panoramas
-    are always whole. Raises `SceneError`: no camera, not a camera, an unknown type, no depth between the clip planes,
-    or an invalid transform.
+    are always whole.
+
+    Raises
+    ------
+    SceneError
+        No camera, not a camera, an unknown type, no depth between the clip planes, or an invalid transform.
     """
     if scene.camera is None:
         raise SceneError(

@@ -41,8 +41,11 @@ class Explicit:
 def read_explicit(depsgraph: bpy.types.Depsgraph) -> Explicit | None:
     """Polygons of all marked objects of a view layer that render, and of their instances; None where there are none.
 
-    Raises `SceneError`: a marked object without faces, or with numbers that are none, or one that is linked and cannot
-    be hidden; the message names it.
+    Raises
+    ------
+    SceneError
+        A marked object without faces, or with numbers that are none, or one that is linked and cannot be hidden; the
+        message names it.
     """
     if not any(o.tetflora.is_explicit for o in bpy.data.objects):
         return None

@@ -128,7 +128,10 @@ def parts_of(
 def read_points(obj: bpy.types.Object, kinds: tuple[str, ...], parts: list[Points]) -> FieldPoints:
     """Points of a field of some kinds of plants.
 
-    Raises `SceneError`: an attribute of the wrong type or domain, or with values that cannot be.
+    Raises
+    ------
+    SceneError
+        An attribute of the wrong type or domain, or with values that cannot be.
     """
     sizes = [point_count(part) for part in parts]
     sized = list(zip(parts, sizes, strict=True))
@@ -336,8 +339,10 @@ def stored_now(obj: bpy.types.Object) -> Integers:
 def read_sizes(obj: bpy.types.Object, parts: Sequence[Points]) -> Sizes | None:
     """Recorded sizes of the points of a field; None where none are stored.
 
-    Raises `SceneError`: an attribute of the wrong type, or values that are no sizes; names the object, their number and
-    the first one.
+    Raises
+    ------
+    SceneError
+        An attribute of the wrong type, or values that are no sizes; names the object, their number and the first one.
     """
     names = (*NUMBERS, OFFSET, FIT)
     if not any(name in part.attributes for part in parts for name in names):
@@ -358,7 +363,10 @@ def read_sizes(obj: bpy.types.Object, parts: Sequence[Points]) -> Sizes | None:
 def read_records(obj: bpy.types.Object, parts: Sequence[Points]) -> History | None:
     """Which records the points of a field are; None where they are plants.
 
-    Raises `SceneError`: as `read_sizes`; years of a plant that do not ascend; years without numbers of plants.
+    Raises
+    ------
+    SceneError
+        As `read_sizes`; years of a plant that do not ascend; years without numbers of plants.
     """
     if not any(YEAR in part.attributes for part in parts):
         return None

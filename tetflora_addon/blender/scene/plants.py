@@ -135,7 +135,10 @@ class _Found:
 def read_sources(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> list[Source]:
     """What `read_plants` reads, object by object, with ages and recorded sizes as they are stored.
 
-    Raises `SceneError`: as `read_plants`, and where nobody has the species of a plant.
+    Raises
+    ------
+    SceneError
+        As `read_plants`, and where nobody has the species of a plant.
     """
     found = _find_plants(scene, depsgraph)
     if found.odd or not found.sources:
@@ -229,8 +232,12 @@ class AssetPlants:
 def read_asset_plants(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> list[AssetPlants]:
     """Enabled plants of a view layer that render and whose species is an asset, in the order of `read_plants`.
 
-    Objects that show a collection which is a species count as plants of it, each by itself, seeded by its name. Raises
-    `SceneError`: a transform that is not a number; the message names the object.
+    Objects that show a collection which is a species count as plants of it, each by itself, seeded by its name.
+
+    Raises
+    ------
+    SceneError
+        A transform that is not a number; the message names the object.
     """
     assets = asset_species(scene)
     if not assets:

@@ -37,9 +37,13 @@ def read_skeleton(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Skel
     """The skeleton that an object draws: a curve, a mesh or hair curves, original, with animation and modifiers.
 
     It lies about the object's origin, in meters, z up: with its scale and tilt, without its position and its turn about
-    the vertical, which are the plant's. What the dependency graph does not evaluate is read without modifiers. Raises
-    `SpeciesError`: another type of object, a mesh with faces, no edges, a scale of 0 or above 100,000, or as
-    `skeleton_from_edges`; the message names the object.
+    the vertical, which are the plant's. What the dependency graph does not evaluate is read without modifiers.
+
+    Raises
+    ------
+    SpeciesError
+        Another type of object, a mesh with faces, no edges, a scale of 0 or above 100,000, or as `skeleton_from_edges`;
+        the message names the object.
     """
     if obj.type not in SKELETON_TYPES:
         raise SpeciesError(

@@ -132,7 +132,10 @@ def name_of(identifier: str) -> str:
 def refuse_asset(scene: bpy.types.Scene | None, identifier: str) -> None:
     """Refuse an asset where a species is needed that grows.
 
-    Raises `SpeciesError`: it is one; or it was one, and its object was deleted.
+    Raises
+    ------
+    SpeciesError
+        It is one; or it was one, and its object was deleted.
     """
     entry = find_asset(scene, identifier)
     if entry is not None:

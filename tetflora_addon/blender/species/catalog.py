@@ -133,7 +133,10 @@ def operator_items(_operator: bpy.types.OperatorProperties, _context: bpy.types.
 def default_species() -> str:
     """The species that the catalog offers first.
 
-    Raises `SpeciesError`: there is none.
+    Raises
+    ------
+    SpeciesError
+        There is none.
     """
     known = catalog()
     if not known:
@@ -219,7 +222,10 @@ def own_file(identifier: str) -> Path | None:
 def write_species(scene: bpy.types.Scene, identifier: str, path: Path) -> Path:
     """Write a species as this file has it.
 
-    Raises `SpeciesError`: the species is broken, the file's name is no identifier, or the file cannot be written.
+    Raises
+    ------
+    SpeciesError
+        The species is broken, the file's name is no identifier, or the file cannot be written.
     """
     species_for(scene, identifier)
     checked_identifier(path.stem)
@@ -233,7 +239,10 @@ def write_species(scene: bpy.types.Scene, identifier: str, path: Path) -> Path:
 def save_species(scene: bpy.types.Scene, identifier: str) -> Path:
     """Save a species into the user's own folder, over an earlier file of that name.
 
-    Raises `SpeciesError`: as `write_species`; or there is no folder.
+    Raises
+    ------
+    SpeciesError
+        As `write_species`; or there is no folder.
     """
     species_for(scene, identifier)
     return OWN_FILES.store(identifier, as_text(species_data(scene, identifier)), replace=True)
@@ -243,8 +252,12 @@ def load_species_file(path: Path, replace: bool = False) -> str:
     """Take a species file into the user's own folder; returns the identifier.
 
     It may lie anywhere; in the folder already, it is only checked. ``replace``: an own file of the same name and other
-    content gives way. Raises `SpeciesError`: the file breaks a rule of the format, as the message says, or another one
-    of its name is there.
+    content gives way.
+
+    Raises
+    ------
+    SpeciesError
+        The file breaks a rule of the format, as the message says, or another one of its name is there.
     """
     content = species_file(path)
     species_from_json(content, checked_identifier(path.stem), path.name)

@@ -165,8 +165,10 @@ def edits_of_scenes(scene: bpy.types.Scene | None) -> Iterator[TetFloraSpeciesEd
 def species_for(scene: bpy.types.Scene | None, identifier: str) -> Species:
     """A species as this file has it: edited here, else the catalog's.
 
-    Raises `SpeciesError`: unknown, or broken; the message names the key and what is allowed. Or an asset, which does
-    not grow.
+    Raises
+    ------
+    SpeciesError
+        Unknown, or broken; the message names the key and what is allowed. Or an asset, which does not grow.
     """
     refuse_asset(scene, identifier)
     edit = find_edit(scene, identifier)
@@ -214,7 +216,10 @@ def _problem(text: str, identifier: str) -> str:
 def species_data(scene: bpy.types.Scene | None, identifier: str) -> dict[str, Any]:
     """The decoded JSON of a species, edited or not, valid or not; `change_species` alone may change it.
 
-    Raises `SpeciesError`: unknown species, an asset, or a file that holds no JSON object.
+    Raises
+    ------
+    SpeciesError
+        Unknown species, an asset, or a file that holds no JSON object.
     """
     refuse_asset(scene, identifier)
     edit = find_edit(scene, identifier)
@@ -254,7 +259,10 @@ def change_species(scene: bpy.types.Scene, identifier: str, change: Callable[[di
 def store_species(scene: bpy.types.Scene, identifier: str, data: dict[str, Any]) -> None:
     """Keep a decoded species in this file under an identifier, in place of an earlier one.
 
-    Raises `SpeciesError`: the identifier breaks the rule for them.
+    Raises
+    ------
+    SpeciesError
+        The identifier breaks the rule for them.
     """
     checked_identifier(identifier)
     text = json.dumps(data, ensure_ascii=False)
