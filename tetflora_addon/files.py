@@ -66,7 +66,12 @@ def is_regular(path: Path) -> bool:
 
 
 def read_whole(path: Path, most: int) -> bytes:
-    """The content of a regular file; one of more than ``most`` bytes is not read.
+    """The content of a regular file.
+
+    Parameters
+    ----------
+    most : int
+        Bytes; a larger file is not read.
 
     Raises
     ------
@@ -135,7 +140,11 @@ def parse_json(content: bytes | str, constant: Callable[[str], float] = float) -
     """Decode JSON of which every part is a Python value that texts and floats can hold.
 
     Integers beyond floats become infinite, so that whoever checks a number refuses it by the name of its key.
-    ``constant`` makes numbers of ``NaN``, ``Infinity`` and ``-Infinity``, which JSON does not have.
+
+    Parameters
+    ----------
+    constant : callable
+        Makes numbers of ``NaN``, ``Infinity`` and ``-Infinity``, which JSON does not have.
 
     Raises
     ------

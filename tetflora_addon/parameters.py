@@ -20,11 +20,17 @@ FACTOR = {"subtype": 'FACTOR', "min": 0.0, "max": 1.0}
 
 
 def setting(default: bool | int | float, label: str, description: str, /, **options: Any) -> Any:
-    """A field of a dataclass of settings, with a label and a tooltip; the property of the scene is made from it.
+    """A field of a dataclass of settings; the property of the scene is made from it.
 
-    The type of ``default`` is the property's. ``options`` are what else Blender's properties take: ``min``, ``max``,
-    ``soft_min``, ``soft_max``, ``step``, ``precision``, ``subtype``, ``unit``; and ``default``, where an artist starts
-    with another value than the engine.
+    Parameters
+    ----------
+    default : bool, int or float
+        The field's default; its type is the property's.
+    label, description : str
+        Name in panels, and tooltip.
+    **options
+        What else Blender's properties take: ``min``, ``max``, ``soft_min``, ``soft_max``, ``step``, ``precision``,
+        ``subtype``, ``unit``; and ``default``, where an artist starts with another value than the engine.
     """
     return field(default=default, metadata={"name": label, "description": description, **options})
 
@@ -274,9 +280,16 @@ class FileReader:
         where: str,
         readers: Mapping[str, Callable[[Any, str], Any]] | None = None,
     ) -> Declared:
-        """An object of a dataclass from what `json.load` gave; ``where`` is named in errors.
+        """An object of a dataclass: fields that have keys, and those that have a reader of their own.
 
-        Fields have keys, or one of the ``readers``: what makes the value from the data and the key's whole name.
+        Parameters
+        ----------
+        data : object
+            What `json.load` gave.
+        where : str
+            Named in errors.
+        readers : mapping, optional
+            For each other key, what makes the value of the field of this name from the data and the key's whole name.
         """
         readers = readers or {}
         self.keys(data, where, (*keys_of(kind), *readers))

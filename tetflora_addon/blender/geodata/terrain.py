@@ -55,7 +55,12 @@ _FINEST, _MOST_CELLS = 0.5, 4_000_000  # of the grid that heights are read from:
 
 
 def read_raster(order: Import, path: Path | None = None) -> Job[Raster]:
-    """Read the raster of an import, its tiles as one; yields progress. ``path``: another file, whole, in its place.
+    """Read the raster of an import, its tiles as one; yields progress.
+
+    Parameters
+    ----------
+    path : Path, optional
+        Another file, which is read whole, in its place.
 
     Raises
     ------
@@ -138,10 +143,19 @@ def _loaded(path: Path, unreadable: str) -> bpy.types.Image:
 
 @importing
 def terrain_steps(order: Import, most: int, image: Path | None = None) -> Steps:
-    """Make ground of at most so many faces; yields progress. Closing the steps leaves all as it was.
+    """Make ground; yields progress. Closing the steps leaves all as it was.
 
-    ``image`` is an orthophoto, which becomes its color. A file that is broken, or cannot lie in this scene, is a
-    `SceneError`.
+    Parameters
+    ----------
+    most : int
+        Faces.
+    image : Path, optional
+        An orthophoto, which becomes its color.
+
+    Raises
+    ------
+    SceneError
+        The file is broken, or cannot lie in this scene.
     """
     raster = yield from read_raster(order)
     photo = None if image is None else _photo_place(image, raster.system)

@@ -164,8 +164,17 @@ def inventory_steps(
 ) -> Steps:
     """Make a field of the trees of a file; yields progress. Closing the steps leaves all as it was.
 
-    ``unknown``, for trees of species that nobody knows, is `GENERIC`, `LEFT_OUT`, or the identifier of a species; the
-    rest is as of `read_inventory`. A file that is broken, or cannot lie in this scene, is a `SceneError`.
+    Parameters
+    ----------
+    unknown : str
+        `GENERIC`, `LEFT_OUT`, or the identifier of a species for trees of species that nobody knows.
+    units, skip, columns
+        As of `read_inventory`.
+
+    Raises
+    ------
+    SceneError
+        The file is broken, or cannot lie in this scene.
     """
     progress = Progress(0.0, f"Reading {order.path.name}")
     yield progress

@@ -62,8 +62,19 @@ def scene_digest(
 ) -> str:
     """Digest of camera, plants, meshes, assets, occluders, lights, settings, species, materials, day and wind.
 
-    In the wind it changes with each frame. ``camera`` and ``given``, from `read_scene`, take the place of the scene's
-    own. A scene that cannot be refined as it is raises `TetFloraError`.
+    In the wind it changes with each frame.
+
+    Parameters
+    ----------
+    camera : Camera, optional
+        Instead of the scene's current one.
+    given : Given, optional
+        From `read_scene` for the scene.
+
+    Raises
+    ------
+    TetFloraError
+        The scene cannot be refined as it is.
     """
     if given is None:
         given = read_scene(scene, depsgraph)

@@ -125,9 +125,12 @@ class Knot:
 def place_group() -> bpy.types.NodeTree:
     """The group "TetFlora Bark Place": where on a branch a point lies.
 
-    Outputs are Place, on the cylinder of radius 1 (in radii, moved by the branch's color), Turn, Along (radii), and
-    Perimeter, meters. The perimeter P is that of the branch where it is seen: a relief of height u times D tilts the
-    normal by θ with tan θ = D |∇u| = D / P (Mikkelsen 2010, "Bump mapping unparametrized surfaces on the GPU").
+    Returns
+    -------
+    bpy.types.NodeTree
+        Outputs Place, on the cylinder of radius 1 (in radii, moved by the branch's color), Turn, Along (radii), and
+        Perimeter, meters. The perimeter P is that of the branch where it is seen: a relief of height u times D tilts
+        the normal by θ with tan θ = D |∇u| = D / P (Mikkelsen 2010, "Bump mapping unparametrized surfaces on the GPU").
     """
 
     def build(graph: Graph, _given: Any) -> dict[str, Any]:
@@ -150,13 +153,26 @@ def place_group() -> bpy.types.NodeTree:
 
 
 def bark_group(character: str) -> bpy.types.NodeTree:
-    """The group "TetFlora <Character> Bark" of one of `BARKS`; a `SpeciesError` for any other.
+    """The group "TetFlora <Character> Bark".
 
-    Inputs are Color, Scale, Stretch, Contrast, Depth, Smooth Under, Full Over, Moss, Lichen; outputs Color, whose mean
-    over the surface is the color that went in, Normal, Gain, and Shown, which is 0 where both are those of a smooth
-    twig: Cycles then passes over all nodes of the pattern, which is most of the wood in a crown. Gain is what Cycles
-    loses at a normal that is tilted by θ, and EEVEE does not: of the light that comes evenly from the normal's half
-    space the fraction (1 + cos θ) / 2 lies above the surface itself.
+    Parameters
+    ----------
+    character : str
+        One of `BARKS`.
+
+    Returns
+    -------
+    bpy.types.NodeTree
+        Inputs Color, Scale, Stretch, Contrast, Depth, Smooth Under, Full Over, Moss, Lichen; outputs Color, whose
+        mean over the surface is the color that went in, Normal, Gain, and Shown, which is 0 where both are those of
+        a smooth twig: Cycles then passes over all nodes of the pattern, which is most of the wood in a crown. Gain is
+        what Cycles loses at a normal that is tilted by θ, and EEVEE does not: of the light that comes evenly from the
+        normal's half space the fraction (1 + cos θ) / 2 lies above the surface itself.
+
+    Raises
+    ------
+    SpeciesError
+        There is no such bark.
     """
     bark = _bark(character)
     inputs = (
@@ -297,8 +313,14 @@ def cell(graph: Graph, place: Term) -> Cell:
 def knot(graph: Graph, place: Place, size: float, noise: Term, apart: float = 1.0) -> Knot:
     """Scars of shed branches: sparse, and the larger the thicker the branch.
 
-    ``size`` is that of the largest eye, in radii of the branch; ``noise``, a vector around .5, makes their outline
-    uneven; where ``apart`` is more than 1 there are fewer of them.
+    Parameters
+    ----------
+    size : float
+        Of the largest eye, in radii of the branch.
+    noise : Vector
+        Around .5; what makes their outline uneven.
+    apart : float
+        More than 1: fewer of them.
     """
     spacing = _KNOTS_APART * apart
     where = bent(place.round * (1.0 / spacing), noise, 0.35 * size / spacing)

@@ -83,11 +83,19 @@ BLADES: dict[str, BladeLook] = {
 
 
 def blade_group(kind: str) -> bpy.types.NodeTree:
-    """The group "TetFlora <Kind> Leaf Blade" of one of `BLADES`.
+    """The group "TetFlora <Kind> Leaf Blade".
 
-    Inputs are Color, Leaf Length, Veins, Midrib, Vein Lines, Dark Against Light, Relief, Mottling, Wear, Paler
-    Underside, Gloss, Roughness; outputs Reflected and Through, the colors of reflected and of passing light, Gloss,
-    Roughness, Normal.
+    Parameters
+    ----------
+    kind : str
+        One of `BLADES`.
+
+    Returns
+    -------
+    bpy.types.NodeTree
+        Inputs Color, Leaf Length, Veins, Midrib, Vein Lines, Dark Against Light, Relief, Mottling, Wear, Paler
+        Underside, Gloss, Roughness. Outputs Reflected and Through, the colors of reflected and of passing light; Gloss;
+        Roughness; Normal.
     """
     blade = BLADES[kind]
     inputs = (

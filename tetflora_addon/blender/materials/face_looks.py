@@ -102,8 +102,12 @@ def _columns(
 def pyramid_of(image: bpy.types.Image, weighted: bool, most: int = MOST_TEXELS) -> Pyramid | None:
     """The pyramid of an image; None if it has no pixels.
 
-    ``weighted``: its alpha counts, so that coarser copies have the color of what is not transparent. ``most``: if less
-    than `MOST_TEXELS`, only about as many columns or rows are looked at.
+    Parameters
+    ----------
+    weighted : bool
+        Whether its alpha counts: coarser copies then have the color of what is not transparent.
+    most : int
+        If less than `MOST_TEXELS`, only about as many columns or rows are looked at.
     """
     if not (all(image.size) and image.channels):
         return None

@@ -32,10 +32,17 @@ _BAKED_VERSION = 2
 def leaf_material(species_name: str, kind: str = "pinnate", **looks: float) -> bpy.types.Material:
     """Material "TetFlora <species> leaf": reads ``tf_color`` and ``tf_transmission`` of each face, veins by ``UVMap``.
 
-    Each species has a material of its own to edit. ``kind`` is one of `blade.BLADES`: a species whose kind changed gets
-    a new material, and the old one stays beside it. ``looks`` are values of the group's inputs that a new material
-    begins with, by name with underscores.
+    Parameters
+    ----------
+    species_name : str
+        Name as the artist reads it; each species has a material of its own to edit.
+    kind : str
+        One of `blade.BLADES`. A species whose kind changed gets a new material; the old one stays beside it.
+    **looks
+        Values of the group's inputs that a new material begins with, by name with underscores.
 
+    Notes
+    -----
     Light that has been scattered before meets the plain leaf, as of proxies: nobody sees veins in it, and Cycles skips
     all nodes of the side of a mix that does not count.
     """
@@ -66,9 +73,21 @@ def leaf_material(species_name: str, kind: str = "pinnate", **looks: float) -> b
 def bark_material(species_name: str, character: str = "ridged") -> bpy.types.Material:
     """Material "TetFlora <species> bark": ``tf_color`` with a pattern that shows when the camera is close.
 
-    ``character`` is one of `bark.BARKS`, or a `SpeciesError`: a species whose character changed gets a new material,
-    and the old one stays beside it. The pattern varies the color around its mean, so that bark and its microsurfaces
-    agree from afar.
+    Parameters
+    ----------
+    species_name : str
+        Name as the artist reads it.
+    character : str
+        One of `bark.BARKS`. A species whose character changed gets a new material; the old one stays beside it.
+
+    Raises
+    ------
+    SpeciesError
+        There is no such bark.
+
+    Notes
+    -----
+    The pattern varies the color around its mean, so that bark and its microsurfaces agree from afar.
     """
 
     def build(graph: Graph, material: bpy.types.Material) -> None:
@@ -94,6 +113,8 @@ def proxy_material(own: bool = False) -> bpy.types.Material:
 
     own: "TetFlora asset proxy", for what stands for the artist's own materials, which mostly are Principled.
 
+    Notes
+    -----
     Facets have the sides of leaves: level leaves show their darker side to the sky, hanging ones the paler one to the
     eye. As of leaves, light that was scattered before meets the mean of both.
     """
@@ -141,6 +162,8 @@ def baked_material() -> bpy.types.Material:
     it. What has no front and back has the same in both, see `emission.light.baked_attributes`. Other rays see the
     proxies' material so that ground and meshes get the usual light and shadows of plants.
 
+    Notes
+    -----
     Rays are distinguished by Light Path: Is Camera Ray. EEVEE has only camera rays and shadows; its light probes and
     reflections see the emission. Cycles must not sample the faces as lights, which they are not.
     """

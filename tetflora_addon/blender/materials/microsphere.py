@@ -50,10 +50,15 @@ _GLANCING, _CLEAR = 0.0, 0.35
 def microsphere_group() -> bpy.types.NodeTree:
     """The group "TetFlora Microsphere": scattering of a cloud, seen at any surface that stands for it.
 
-    Inputs are Color, Transmission, Normal, Plane, p, s, spear, Through Tint, Roundness, Facing; outputs Cycles and
-    EEVEE, one for each engine's material output. Link EEVEE's Thickness to a Value of 0: otherwise EEVEE takes the
-    object's extent for it, and half of what is transmitted is lost.
+    Returns
+    -------
+    bpy.types.NodeTree
+        Inputs Color, Transmission, Normal, Plane, p, s, spear, Through Tint, Roundness, Facing; outputs Cycles and
+        EEVEE, one for each engine's material output. Link EEVEE's Thickness to a Value of 0: otherwise EEVEE takes the
+        object's extent for it, and half of what is transmitted is lost.
 
+    Notes
+    -----
     Particles scatter p cos φ, planes p cos α + s cos^spear β, blended by Plane (paper, section 7; φ is the angle
     between light and viewer, α that between light and plane, β that between viewer and reflection). Of what is
     scattered the fraction Transmission leaves on the other side. Cycles cuts each lobe off at the face's own horizon;
@@ -195,9 +200,12 @@ def _sum(graph: Graph, shaders: list[Any]) -> Any:
 def scatter_group() -> bpy.types.NodeTree:
     """The group "TetFlora Scatter": a thin sheet that reflects and transmits, lit from both sides.
 
-    Inputs are Color, Transmission, Reflected Tint, Through Tint, Gloss, Gloss Roughness, Normal; the output is Shader.
-    Of the light that arrives, (1 − Gloss) · Color is scattered, evenly over the side of the light or, for the fraction
-    Transmission, over the other side, each times its tint; Gloss is mirrored. No more comes out than went in.
+    Returns
+    -------
+    bpy.types.NodeTree
+        Inputs Color, Transmission, Reflected Tint, Through Tint, Gloss, Gloss Roughness, Normal; output Shader. Of the
+        light that arrives, (1 − Gloss) · Color is scattered, evenly over the side of the light or, for the fraction
+        Transmission, over the other side, each times its tint; Gloss is mirrored. No more comes out than went in.
     """
     inputs = (
         ("Color", 'Color', LEAF_GREEN),
@@ -277,9 +285,11 @@ def shell_group() -> bpy.types.NodeTree:
 def baked_shell_group() -> bpy.types.NodeTree:
     """The group "TetFlora Baked Shell": light that a cell gives off, and how much of what is behind passes through.
 
-    With constant density, and the scattered radiance J linear between where the ray enters (J₀) and leaves (J₁), a cell
-    of optical depth τ = κℓ adds B = w₀ J₀ + w₁ J₁ to T = e^{−τ} times what is behind it (paper, section 7), where w₁ =
-    (1 − e^{−τ}(1 + τ)) / τ and w₀ = 1 − (1 − e^{−τ}) / τ.
+    Notes
+    -----
+    With constant density, and the scattered radiance J linear between where the ray enters (J₀) and leaves (J₁), a
+    cell of optical depth τ = κℓ adds B = w₀ J₀ + w₁ J₁ to T = e^{−τ} times what is behind it (paper, section 7), where
+    w₁ = (1 − e^{−τ}(1 + τ)) / τ and w₀ = 1 − (1 − e^{−τ}) / τ.
     """
     inputs = [("Strength", 'Float', 1.0, (0.0, 1000.0), "Multiplies the baked light")]
 

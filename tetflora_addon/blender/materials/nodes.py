@@ -52,12 +52,27 @@ def is_own(datablock: bpy.types.ID) -> bool:
 def get_or_create(
     collection: Any, name: str, version: int, new: Callable[[str], Datablock], build: Callable[[Datablock], None]
 ) -> Datablock:
-    """The datablock of that name in ``bpy.data``, built anew only if there is none or ours is of another version.
+    """The datablock of that name, built anew only if there is none or ours is of another version.
 
-    ``version`` is that of what ``build`` fills the empty datablock with that ``new`` makes; it is stamped on that. What
-    an artist edited or put there under this name comes back untouched. An outdated datablock of ours gets another name,
-    because somebody may have edited it, and is the artist's from then on; one that is linked from another file keeps
-    its name.
+    Parameters
+    ----------
+    collection : bpy_prop_collection
+        Such as ``bpy.data.materials``.
+    name : str
+        Name to look for and to give.
+    version : int
+        Version of what `build` makes; stamped on the datablock.
+    new : callable
+        Makes an empty datablock of a name.
+    build : callable
+        Fills the new datablock.
+
+    Returns
+    -------
+    bpy.types.ID
+        What an artist edited or put there under this name comes back untouched. An outdated datablock of ours gets
+        another name, because somebody may have edited it, and is the artist's from then on; one that is linked from
+        another file keeps its name.
     """
     found = collection.get((name, None)) or collection.get(name)
     if found is not None:
@@ -310,9 +325,14 @@ def node_group(
 ) -> bpy.types.NodeTree:
     """A group of shader nodes, or of ``'Geometry'`` nodes, as `get_or_create` finds or makes it.
 
-    Inputs have a name, a kind (``'Float'``, ``'Color'``, ``'Vector'``, ...), a default, and if needed a range and a
-    description; outputs a name and a kind. ``build`` gets the graph and the inputs by name, and returns what to link to
-    the outputs, by name.
+    Parameters
+    ----------
+    inputs : sequence of tuple
+        Name, kind (``'Float'``, ``'Color'``, ``'Vector'``, ...), default, and if needed a range and a description.
+    outputs : sequence of tuple
+        Name and kind.
+    build : callable
+        Gets the graph and the inputs by name; returns what to link to the outputs, by name.
     """
 
     def fill(tree: bpy.types.NodeTree) -> None:

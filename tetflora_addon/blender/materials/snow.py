@@ -110,10 +110,13 @@ def add_snow(material: bpy.types.Material, mark: bool = False) -> bool:
 
 
 def snow_group() -> bpy.types.NodeTree:
-    """The group "TetFlora Snow": inputs Shader, Carry, Snow Color, Twigs; outputs Shader and Cover.
+    """The group "TetFlora Snow".
 
-    The side of a sheet that faces up is white where Cover is 1. From below, a leaf that lets light through is darker by
-    what the snow keeps from it.
+    Returns
+    -------
+    bpy.types.NodeTree
+        Inputs Shader, Carry, Snow Color, Twigs; outputs Shader and Cover. The side of a sheet that faces up is white
+        where Cover is 1. From below, a leaf that lets light through is darker by what the snow keeps from it.
     """
     inputs = (
         ("Shader", 'Shader'),

@@ -146,10 +146,16 @@ class Results:
     def add_object(
         self, name: str, made: bpy.types.Object, kind: str, sources: Sequence[bpy.types.ID] = (), placed: bool = False
     ) -> bpy.types.Object:
-        """Add an object that was made elsewhere, under a name by `name_for` and of an `output.KIND`.
+        """Add an object that was made elsewhere, under a name by `name_for`.
 
-        ``sources`` are what it shows instances of: if TetFlora made one, it goes with the last object that shows it.
-        What is ``placed`` has a transform and data of its own, which stay; otherwise it counts from the origin.
+        Parameters
+        ----------
+        kind : str
+            See `output.KIND`.
+        sources : sequence of bpy.types.ID
+            What it shows instances of. If TetFlora made that, it goes with the last object that shows it.
+        placed : bool
+            It has a transform and data of its own, which stay; otherwise it counts from the origin.
         """
         for source in sources:
             if is_own(source):

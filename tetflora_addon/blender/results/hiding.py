@@ -350,8 +350,11 @@ def keep_results(scene: bpy.types.Scene) -> int:
 def lift_marks() -> dict[tuple, str | list]:
     """Show what is hidden for results that files do not hold: those of renders, and the artist's unless saved.
 
-    Returns the marks by purpose and name of the object, and linked objects by purpose, name of the scene and None, for
-    `restore_marks`.
+    Returns
+    -------
+    dict
+        The marks by purpose and name of the object, and linked objects by purpose, name of the scene and None, for
+        `restore_marks`.
     """
     lifted = {}
     for scene, purpose in list(scenes_hiding()):

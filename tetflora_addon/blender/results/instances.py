@@ -113,8 +113,16 @@ def add_cluster(
 ) -> bpy.types.Object:
     """Make an object of a mesh of a cluster, in no collection, for `add_cluster_instances`.
 
-    Its name is ``stem``, that of the asset, and ``number``, that of the cluster. The mesh becomes the result's, and
-    goes with it. ``like`` is the object that the faces are of, whose color, pass index and the like materials may read.
+    Parameters
+    ----------
+    stem : str
+        Name of the asset.
+    number : int
+        Of the cluster; the name ends in it.
+    mesh : bpy.types.Mesh
+        Becomes the result's, and goes with it.
+    like : bpy.types.Object, optional
+        The object that the faces are of, whose color, pass index and the like materials may read.
     """
     name = results.name_for(f"{stem} {number:06d}")
     made = bpy.data.objects.new(name, mesh)
@@ -246,9 +254,16 @@ _TURNED_OFF = ("is_scatter", "is_explicit", "is_plant", "is_field", "is_occluder
 def add_stand_in(
     results: Results, name: str, original: bpy.types.Object, depsgraph: bpy.types.Depsgraph
 ) -> bpy.types.Object | None:
-    """Add what an object shows besides instances to the results, under a name that ends in a number; None if nothing.
+    """Add what an object shows besides instances to the results; None if that is nothing.
 
-    ``original`` is of this file or of a library, shown or hidden; in the dependency graph it is shown.
+    Parameters
+    ----------
+    name : str
+        Of the new object, ending in a number.
+    original : bpy.types.Object
+        Of this file or of a library; shown or hidden.
+    depsgraph : bpy.types.Depsgraph
+        In which it is shown.
     """
     if not shows_itself(original, depsgraph):
         return None

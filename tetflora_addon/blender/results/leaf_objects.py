@@ -40,7 +40,15 @@ _DIRECTIONS = tau * np.arange(48) / 48
 
 
 def species_leaf_material(species: Species, kind: str) -> bpy.types.Material:
-    """TetFlora's own material for the leaves or blossoms (`LEAF_KINDS`) of a species, resolved or not."""
+    """TetFlora's own material for the leaves or blossoms of a species.
+
+    Parameters
+    ----------
+    species : Species
+        Resolved or not.
+    kind : str
+        One of `LEAF_KINDS`.
+    """
     forms = species.forms(LEAF_KINDS.index(kind))
     model = forms[0] if isinstance(forms[0], LeafModel) else None
     through = species.leaf_transmission if kind == "leaf" else species.blossom_transmission
@@ -55,7 +63,12 @@ def species_leaf_material(species: Species, kind: str) -> bpy.types.Material:
 def blade_kind(model: LeafModel, transmission: float, kind: str = "leaf") -> str:
     """One of `blade.BLADES` for a leaf model, by its outline, else by its UV map: the pattern lies in that.
 
-    ``transmission`` is the fraction of light that is scattered through the leaf, ``kind`` one of `LEAF_KINDS`.
+    Parameters
+    ----------
+    transmission : float
+        Fraction of light that is scattered through the leaf.
+    kind : str
+        One of `LEAF_KINDS`.
     """
     if transmission < _THICK or isinstance(model.shape, Needles):
         return "needle" if kind == "leaf" else "plain"
@@ -140,7 +153,12 @@ def leaf_objects(scene: bpy.types.Scene) -> dict[str, bpy.types.Object]:
 
 
 def resolved_species(scene: bpy.types.Scene, kind_of_plant: str, depsgraph: bpy.types.Depsgraph) -> Species:
-    """A species of a kind of plant with polygons and a skeleton in place of the names of objects.
+    """A species with polygons and a skeleton in place of the names of objects.
+
+    Parameters
+    ----------
+    kind_of_plant : str
+        See `species.kinds`.
 
     Raises
     ------
@@ -194,8 +212,14 @@ def _model_of(species: Species, source: bpy.types.Object, depsgraph: bpy.types.D
 def materials_of(scene: bpy.types.Scene, species: Species, kind: str, form: int) -> list[bpy.types.Material]:
     """Materials for polygons of a kind: the artist's for the species, else a leaf object's own, else TetFlora's.
 
-    ``species`` may be resolved or not: its identifier determines where its leaves come from. ``kind`` is ``'bark'`` or
-    one of `LEAF_KINDS`, ``form`` which form of leaf.
+    Parameters
+    ----------
+    species : Species
+        Resolved or not; its identifier determines where its leaves come from.
+    kind : str
+        ``'bark'`` or one of `LEAF_KINDS`.
+    form : int
+        Which form of leaf.
     """
     replaced = replaced_material(scene, species.identifier, kind)
     if replaced is not None:

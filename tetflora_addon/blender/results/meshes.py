@@ -33,14 +33,26 @@ _DOMAINS = ("POINT", "FACE", "CORNER")
 
 
 def write_mesh(name: str, buffers: MeshBuffers, materials: Sequence[bpy.types.Material | None] = ()) -> bpy.types.Mesh:
-    """Make a mesh datablock from buffers (``docs/architecture.md``), with material slots, not linked to any object.
-
-    ``UVMap`` becomes the UV map; an INT attribute ``material_index`` on ``'FACE'`` chooses among the materials. Blender
-    appends a number to a name that is taken.
+    """Make a mesh datablock from buffers.
 
     Topology is copied, edges included, so that Blender computes nothing; where buffers have none it finds them.
     Positions and indices are written through the mesh's attributes, which are plain memory; the collections
     ``vertices`` and ``loops`` are many times slower.
+
+    Parameters
+    ----------
+    name : str
+        Name of the new datablock; Blender appends a number where it is taken.
+    buffers : MeshBuffers
+        The mesh, see ``docs/architecture.md``. ``UVMap`` becomes the UV map; an INT attribute ``material_index`` on
+        ``'FACE'`` chooses among `materials`.
+    materials : sequence of bpy.types.Material or None
+        Material slots in their order.
+
+    Returns
+    -------
+    bpy.types.Mesh
+        Not linked to any object.
 
     Raises
     ------
@@ -140,9 +152,18 @@ def _check_range(key: str, indices: NDArray, count: int) -> None:
 
 
 def read_mesh_arrays(mesh: bpy.types.Mesh) -> MeshBuffers:
-    """Copy a mesh, of an object or evaluated, into buffers, in its own space; in Edit Mode update it first.
+    """Copy a mesh into buffers: the geometry, the active UV map and the indices of materials if there are any.
 
-    Attributes are ``UVMap``, the active UV map, and ``material_index``, if there are any; it is smooth if any face is.
+    Parameters
+    ----------
+    mesh : bpy.types.Mesh
+        Of an object or evaluated. In Edit Mode, call ``obj.update_from_editmode()`` first. Positions stay in the mesh's
+        own space.
+
+    Returns
+    -------
+    MeshBuffers
+        Copies; ``attributes`` may have ``UVMap`` and ``material_index``; ``smooth`` if any face is.
     """
     positions = members(mesh.vertices, "co", 3)
     edges = members(mesh.edges, "vertices", 2, np.int32)
@@ -159,10 +180,24 @@ def read_mesh_arrays(mesh: bpy.types.Mesh) -> MeshBuffers:
 
 
 def point_object(name: str, buffers: PointBuffers, material: bpy.types.Material) -> bpy.types.Object:
-    """Make an object of points of a material that render as spheres, not linked to any collection.
+    """Make an object of points that render as spheres, not linked to any collection.
 
-    Its data is a point cloud, or a mesh with a modifier. Blender appends a number to a name that is taken. Arrays of
-    wrong shape or type are a `ValueError`, which leaves no datablock behind.
+    Parameters
+    ----------
+    name : str
+        Name of the new datablocks; Blender appends a number where it is taken.
+    material : bpy.types.Material
+        Of all points.
+
+    Returns
+    -------
+    bpy.types.Object
+        Its data is a point cloud, or a mesh with a modifier.
+
+    Raises
+    ------
+    ValueError
+        Arrays of wrong shape or type; no datablock is left behind.
     """
     none, values = np.zeros(0, np.int32), {"radius": buffers.radius, **buffers.attributes}
     attributes = {name: ("POINT", array) for name, array in values.items()}

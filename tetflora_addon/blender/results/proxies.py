@@ -104,8 +104,17 @@ def write_proxies(
 ) -> Job[None]:
     """Make the proxies of a refined scene; a thread makes the next block while one is written.
 
-    ``statistics`` get the number of faces or points, and their memory; progress goes from .95 on. ``baking`` has the
-    light of proxies, whose facets must have been added last.
+    Parameters
+    ----------
+    statistics : Statistics
+        Gets the number of faces or points, and their memory.
+    baking : Baking, optional
+        With the light of proxies. Their facets must have been added last.
+
+    Yields
+    ------
+    Progress
+        From .95 on.
     """
     emission = form.emission
     baked = baking is not None and emission.baked_blocks is not None

@@ -27,8 +27,12 @@ def read_camera(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, region_o
     ``camera.view_frame`` already knows about lens shift, sensor fit and pixel aspect. A scaled or sheared camera is
     taken without scale and shear, as renderers do. Panoramas other than equirectangular ones count as images of the
     whole sphere with the same number of pixels per angle, or narrow fisheyes as a part of it. Stereo counts as
-    movement: the view is as wide as both eyes need. ``region_only``: of the render region, if there is one; panoramas
-    are always whole.
+    movement: the view is as wide as both eyes need.
+
+    Parameters
+    ----------
+    region_only : bool
+        Of the render region, if there is one, instead of the whole image. Panoramas are always whole.
 
     Raises
     ------
@@ -189,6 +193,13 @@ def _while_open(
 def _stereo_views(scene: bpy.types.Scene, camera: Camera, depsgraph: bpy.types.Depsgraph) -> tuple[Camera, ...]:
     """Cameras that a scene renders beside its active one; none without stereoscopy.
 
+    Parameters
+    ----------
+    camera : Camera
+        The active one.
+
+    Notes
+    -----
     *Stereo 3D* moves the camera by half of the distance of the eyes to either side (or all of it, by the pivot), and
     lets the views meet at the distance of convergence: by shifting the window, by turning the camera, or not at all.
     *Multi-View* has a camera for each suffix of a name.

@@ -277,9 +277,13 @@ class _OneByOne(Exception):
 def copies_of(objects: Sequence[bpy.types.Object], depsgraph: bpy.types.Depsgraph) -> list[Copies]:
     """Places of all plants and fields that some objects instance, the objects themselves not included.
 
-    These are originals that render, in an order that does not change. Individuals are distinguished by the instancer's
-    name and by the ``id`` of the instance, which is its number where nodes set none, so that they stay the same while
-    an animation goes on.
+    Individuals are distinguished by the instancer's name and by the ``id`` of the instance, which is its number where
+    nodes set none, so that they stay the same while an animation goes on.
+
+    Parameters
+    ----------
+    objects : sequence of bpy.types.Object
+        Original objects that render, in an order that does not change.
     """
     found: list[Copies] = []
     left: set[bpy.types.Object] = set()

@@ -34,16 +34,26 @@ def upright_turn(matrix: Floats) -> float:
 
 
 def read_skeleton(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Skeleton:
-    """The skeleton that an object draws: a curve, a mesh or hair curves, original, with animation and modifiers.
+    """The skeleton that an object draws.
 
-    It lies about the object's origin, in meters, z up: with its scale and tilt, without its position and its turn about
-    the vertical, which are the plant's. What the dependency graph does not evaluate is read without modifiers.
+    Parameters
+    ----------
+    obj : bpy.types.Object
+        A curve, a mesh or hair curves; the original object.
+    depsgraph : bpy.types.Depsgraph
+        Applies animation and modifiers. An object that it does not evaluate is read without its modifiers.
+
+    Returns
+    -------
+    Skeleton
+        About the object's origin, in meters, z up: with its scale and tilt, without its position and its turn about
+        the vertical, which are the plant's.
 
     Raises
     ------
     SpeciesError
-        Another type of object, a mesh with faces, no edges, a scale of 0 or above 100,000, or as `skeleton_from_edges`;
-        the message names the object.
+        Another type of object, a mesh with faces, no edges, a scale of 0 or above 100,000, or as
+        `skeleton_from_edges`; the message names the object.
     """
     if obj.type not in SKELETON_TYPES:
         raise SpeciesError(

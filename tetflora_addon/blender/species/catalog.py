@@ -99,9 +99,14 @@ def number_of(identifier: str) -> int:
 
 
 def items_for(present: str = "", assets: bool = True) -> list[Item]:
-    """Items of an enumeration: the catalog, with or without assets, and the present choice.
+    """Items of an enumeration: the catalog, and the present choice if the catalog does not have it.
 
-    ``present``, the identifier that is chosen now, survives although its file is missing.
+    Parameters
+    ----------
+    present : str
+        Identifier that is chosen now; it survives although its file is missing.
+    assets : bool
+        Whether objects that are used as species are among the items.
     """
     known = catalog() if assets else grown()
     icons = {identifier: icon_of(identifier) for identifier in known}
@@ -184,8 +189,12 @@ def _choose(group: SpeciesChoice, number: int) -> None:
 def gallery_of(entries: str, kind: type[SpeciesChoice]) -> object:
     """A choice that is a button in panels, a plus, and opens a gallery of pictures: what is clicked is added to a list.
 
-    ``entries`` is the name of the list in the group of properties to which this is given, ``kind`` the class of its
-    entries.
+    Parameters
+    ----------
+    entries : str
+        Name of the list of species in the group of properties to which this is given.
+    kind : type
+        Class of the list's entries.
     """
     return once.choice(
         "Add Species",
@@ -251,8 +260,12 @@ def save_species(scene: bpy.types.Scene, identifier: str) -> Path:
 def load_species_file(path: Path, replace: bool = False) -> str:
     """Take a species file into the user's own folder; returns the identifier.
 
-    It may lie anywhere; in the folder already, it is only checked. ``replace``: an own file of the same name and other
-    content gives way.
+    Parameters
+    ----------
+    path : Path
+        Anywhere; a file that lies in the folder already is only checked.
+    replace : bool
+        Whether an own file of the same name and other content gives way.
 
     Raises
     ------

@@ -123,7 +123,10 @@ class Page(NamedTuple):
 def find_edit(scene: bpy.types.Scene | None, identifier: str) -> TetFloraSpeciesEdit | Page | None:
     """What this file has in place of a species.
 
-    A scene is looked at before the file's others: a species is the same in all of them unless two scenes disagree.
+    Parameters
+    ----------
+    scene : bpy.types.Scene or None
+        Looked at before the file's other scenes: a species is the same in all of them unless two scenes disagree.
     """
     return next((edit for edit in _edits(scene) if edit.identifier == identifier), None)
 
@@ -214,7 +217,12 @@ def _problem(text: str, identifier: str) -> str:
 
 
 def species_data(scene: bpy.types.Scene | None, identifier: str) -> dict[str, Any]:
-    """The decoded JSON of a species, edited or not, valid or not; `change_species` alone may change it.
+    """The decoded JSON of a species, edited or not, valid or not.
+
+    Returns
+    -------
+    dict
+        Shared with other callers: look, do not touch. Use `change_species` to change it.
 
     Raises
     ------
@@ -248,8 +256,12 @@ def _decoded(text: bytes | str, name: str) -> dict[str, Any]:
 def change_species(scene: bpy.types.Scene, identifier: str, change: Callable[[dict[str, Any]], None]) -> None:
     """Change a species in this file; the catalog's file stays as it is. Errors are those of `species_data`.
 
-    The scene receives the edit if no scene of the file has one yet. What comes of a change of the decoded JSON need not
-    be valid; `problem_of` tells.
+    Parameters
+    ----------
+    scene : bpy.types.Scene
+        Receives the edit if no scene of the file has one yet.
+    change : callable
+        Changes the decoded JSON that it is given. What comes of it need not be valid; `problem_of` tells.
     """
     data = copy.deepcopy(species_data(scene, identifier))
     change(data)
