@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from ..arrays import Floats32
 from ..buffers import MeshBuffers
 from ..errors import TetFloraError
-from .forest import CUT, BakedSurface, Forest, ForestPart, Variant
+from .forest import BakedSurface, Forest, ForestPart, Variant
 from .levels import corner_triangles, triangles
 
 _FLOAT, _BYTE, _INT = 5126, 5121, 5125
@@ -124,7 +124,7 @@ def _add_material(document: _Document, folder: Path, surface: BakedSurface) -> i
     made["extensions"] = {"KHR_materials_ior": {"ior": surface.index}}
     made |= {"normalTexture": textures["normal"]} if "normal" in textures else {}
     if surface.sided:
-        made |= {"alphaMode": "MASK", "alphaCutoff": CUT, "extras": {"transmission": surface.transmission}}
+        made["extras"] = {"transmission": surface.transmission}
     return document.add("materials", made)
 
 

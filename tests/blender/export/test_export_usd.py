@@ -14,7 +14,7 @@ from devtools import session
 from tests.blender.scenes import add_plant, datablocks, depsgraph
 from tests.limits import full_disk
 from tetflora_addon.blender import compat
-from tetflora_addon.blender.attributes import image_pixels, linear_rgb, values_of
+from tetflora_addon.blender.attributes import image_pixels, linear_rgb, members, values_of
 from tetflora_addon.blender.export.forest import ExportOrder, export_steps
 from tetflora_addon.blender.export.usd import forest_steps
 from tetflora_addon.blender.geodata.origin import Import
@@ -180,6 +180,16 @@ def test_a_full_disk_leaves_no_half_file(blender, tmp_path, suffix, pxr):
     assert path.read_text() == "an earlier one"
 
 
+def test_variants_beyond_max_memory_are_refused(blender, tmp_path, monkeypatch):
+    """All plants may be different, up to what fits; levels with too many polygons do not count."""
+    field()
+    monkeypatch.setattr("tetflora_addon.blender.export.forest.memory_left", lambda _scene: 2e6)
+    with pytest.raises(TetFloraError, match=r"Variants of \w+ would make more than .* lower Variants or Max Polygons"):
+        export(tmp_path / "f.obj", variants=30)
+    assert list(tmp_path.iterdir()) == []
+    assert export(tmp_path / "f.obj", variants=2, polygons=300).variants == 4
+
+
 def test_closing_the_steps_leaves_no_half_file(blender, tmp_path, pxr):
     field()
     steps = export_steps(scene(), depsgraph(), ExportOrder(tmp_path / "f.usdc", 1, polygons=3000, bake=False))
@@ -214,12 +224,17 @@ def test_blender_reads_the_plant_with_its_textures(blender, tmp_path, pxr):
     assert bpy.ops.wm.usd_import(filepath=str(tmp_path / "f.usdc")) == {'FINISHED'}
     leaf = next(o for o in bpy.data.objects if o.name.startswith("leaf"))
     assert len(leaf.data.polygons) > 1000
+    # EEVEE blends what a texture could cut, in any order; and leaves without normals are smoothed.
+    assert {material.surface_render_method for material in bpy.data.materials} == {'DITHERED'}
+    corners, faces = (members(of, "vector", 3) for of in (leaf.data.corner_normals, leaf.data.polygon_normals))
+    np.testing.assert_allclose(corners, np.repeat(faces, [p.loop_total for p in leaf.data.polygons], axis=0), atol=1e-3)
     images = {Path(image.filepath).name: image for image in bpy.data.images if image.size[0]}
     kinds = ("leaf_color", "leaf_normal", "bark_color", "bark_roughness")  # the own bark has no relief
     assert set(images) == {f"bush_{kind}.png" for kind in kinds}
     assert image_pixels(images["bush_bark_roughness.png"])[..., 0].std() > 0.1
     pixels = linear_rgb(images["bush_leaf_color.png"], image_pixels(images["bush_leaf_color.png"]))
-    shown = image_pixels(images["bush_leaf_color.png"])[..., 3] > 0.5
+    outline = bpy.data.images.load(str(tmp_path / "f_textures" / "bush_leaf_opacity.png"))
+    shown = image_pixels(outline)[..., 0] > 0.5
     color = values_of(leaf.data.attributes["displayColor"]).mean(axis=0)[:3]
     np.testing.assert_allclose(pixels[shown].mean(axis=0), color, rtol=0.15)
     assert pixels[shown].std(axis=0).max() > 0.005  # veins and shades

@@ -22,8 +22,8 @@ from numpy.typing import NDArray
 from ...arrays import Integers
 from ...buffers import MeshBuffers
 from ...errors import SceneError, TetFloraError, listed
-from ...export.forest import CUT, BakedSurface, Forest, ForestPart, PointAttributes, Variant, identifiers
-from ...export.gltf import vertex_normals
+from ...export.forest import BakedSurface, Forest, ForestPart, PointAttributes, Variant, identifiers
+from ...export.gltf import face_normals, vertex_normals
 from ...growth.hashing import child_key, key_of_seed, uniform
 from ...jobs import Progress
 from ...planting.rules import species_by_weight
@@ -187,9 +187,9 @@ def _write_mesh(pxr: SimpleNamespace, stage: object, path: str, mesh: MeshBuffer
     made.CreateDoubleSidedAttr(surface.sided)
     ends = np.stack([mesh.positions.min(axis=0), mesh.positions.max(axis=0)])
     made.CreateExtentAttr(_array(pxr, "Vec3f", ends))
-    if mesh.smooth:
-        made.CreateNormalsAttr(_array(pxr, "Vec3f", vertex_normals(mesh)))
-        made.SetNormalsInterpolation(pxr.UsdGeom.Tokens.vertex)
+    # Blender smooths what has no normals, leaves too, and in EEVEE these are a quarter darker then.
+    made.CreateNormalsAttr(_array(pxr, "Vec3f", vertex_normals(mesh) if mesh.smooth else face_normals(mesh)))
+    made.SetNormalsInterpolation(pxr.UsdGeom.Tokens.vertex if mesh.smooth else pxr.UsdGeom.Tokens.uniform)
     primvars, types, tokens = pxr.UsdGeom.PrimvarsAPI(made), pxr.Sdf.ValueTypeNames, pxr.UsdGeom.Tokens
     uv, color = (mesh.attributes[name][1] for name in ("UVMap", "tf_color"))
     _add_indexed(pxr, primvars.CreatePrimvar("st", types.TexCoord2fArray, tokens.faceVarying), "Vec2f", uv)
@@ -242,19 +242,16 @@ def _write_texture(
     image.CreateInput("wrapT", types.Token).Set("repeat")
     image.CreateInput("sourceColorSpace", types.Token).Set("sRGB" if name == "color" else "raw")
     image.CreateInput("st", types.Float2).ConnectToSource(place.ConnectableAPI(), "result")
-    inputs: Mapping[str, tuple] = {
-        "color": (("diffuseColor", "rgb", types.Color3f), ("opacity", "a", types.Float)),
-        "roughness": (("roughness", "r", types.Float),),
-        "normal": (("normal", "rgb", types.Normal3f),),
-    }
+    key, output, of = {
+        "color": ("diffuseColor", "rgb", types.Color3f),
+        "roughness": ("roughness", "r", types.Float),
+        "normal": ("normal", "rgb", types.Normal3f),
+    }[name]
     if name == "normal":
         image.CreateInput("scale", types.Float4).Set(pxr.Gf.Vec4f(2.0, 2.0, 2.0, 1.0))
         image.CreateInput("bias", types.Float4).Set(pxr.Gf.Vec4f(-1.0, -1.0, -1.0, 0.0))
-    if name == "color":  # outlines are cut out, not blended
-        shader.CreateInput("opacityThreshold", types.Float).Set(CUT)
-    for key, output, of in inputs[name]:
-        image.CreateOutput(output, types.Float if len(output) == 1 else types.Float3)
-        shader.CreateInput(key, of).ConnectToSource(image.ConnectableAPI(), output)
+    image.CreateOutput(output, types.Float if len(output) == 1 else types.Float3)
+    shader.CreateInput(key, of).ConnectToSource(image.ConnectableAPI(), output)
 
 
 def read_parts(path: Path) -> Iterator[tuple[str, dict, PointAttributes]]:
