@@ -52,7 +52,6 @@ class BakedSurface:
     transmission: float = 0.0
     roughness: float = 0.6
     gloss: float = 0.0  # fraction of light that is mirrored, mean of directions
-    sided: bool = False  # whether both sides of its sheets are seen
     #: Name of a texture, ``color``, ``normal`` or ``roughness``, to its file.
     textures: Mapping[str, str] = field(default_factory=dict)
 

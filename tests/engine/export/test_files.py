@@ -25,7 +25,18 @@ from tetflora_addon.export.forest import (
     written_whole,
 )
 from tetflora_addon.export.gltf import write_gltf
-from tetflora_addon.export.images import LEAVES, TEXELS, Palette, atlas, halved, in_atlas, outline, palette_of, png, tiled
+from tetflora_addon.export.images import (
+    LEAVES,
+    TEXELS,
+    Palette,
+    atlas,
+    halved,
+    in_atlas,
+    outline,
+    palette_of,
+    png,
+    tiled,
+)
 from tetflora_addon.export.levels import levels_of
 from tetflora_addon.export.obj import write_obj
 from tetflora_addon.growth.seeds import Seeds
@@ -39,7 +50,7 @@ NUMBER = 7
 def forest() -> Forest:
     """Some plants of one variant, far from the origin, turned about an oblique axis."""
     levels = levels_of(compile_species([load_species("bush")]), Seeds.upright(1), 3)
-    looks = {part: BakedSurface(f"bush_{part}", (0.1, 0.2, 0.05), sided=part != "bark") for part, _ in levels[0].parts}
+    looks = {part: BakedSurface(f"bush_{part}", (0.1, 0.2, 0.05)) for part, _ in levels[0].parts}
     rng, each = np.random.default_rng(2), np.zeros(NUMBER, np.int32)
     turn = rng.normal(size=(NUMBER, 4))
     turn /= np.linalg.norm(turn, axis=1, keepdims=True)
@@ -63,7 +74,8 @@ def test_gltf_has_all_places_and_levels(forest, tmp_path):
     list(write_gltf(path, forest))
     assert [p.name for p in tmp_path.iterdir()] == ["f.glb"]
     read = pygltflib.GLTF2().load(str(path))
-    assert {m.alphaMode for m in read.materials} == {"OPAQUE"}  # polygons have the outlines of leaves
+    # Polygons have the outlines of leaves, and twigs are sheets, too.
+    assert {(m.alphaMode, m.doubleSided) for m in read.materials} == {("OPAQUE", True)}
     assert set(read.extensionsUsed) == {"EXT_mesh_gpu_instancing", "KHR_materials_ior", "MSFT_lod"}
     (root,) = read.scenes[0].nodes
     node, part = read.nodes[root], forest.parts[0]

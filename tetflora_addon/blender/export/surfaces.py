@@ -151,7 +151,7 @@ def _surface(scene: bpy.types.Scene, look: _Look, folder: Path, textures: str, b
         (folder / textures / f"{look.name}_{key}_half.png").write_bytes(half)
     names.pop("opacity", None)
     color = tuple(look.color.tolist())
-    return BakedSurface(look.name, color, look.mean("tf_transmission"), rough, gloss, not is_bark, names)
+    return BakedSurface(look.name, color, look.mean("tf_transmission"), rough, gloss, names)
 
 
 def _meters(mesh: MeshBuffers) -> float:

@@ -20,10 +20,11 @@ from mathutils import Matrix
 from numpy.typing import NDArray
 
 from ...arrays import Integers
-from ...buffers import MeshBuffers
+from ...buffers import concatenate_buffers
 from ...errors import SceneError, TetFloraError, listed
 from ...export.forest import BakedSurface, Forest, ForestPart, PointAttributes, Variant, identifiers
-from ...export.gltf import face_normals, vertex_normals
+from ...export.gltf import corner_normals
+from ...export.levels import PlantLevel
 from ...growth.hashing import child_key, key_of_seed, uniform
 from ...jobs import Progress
 from ...planting.rules import species_by_weight
@@ -169,8 +170,7 @@ def _write_variant(pxr: SimpleNamespace, stage: object, path: str, variant: Vari
         levels.AddVariant(f"{LEVELS}{number}")
         levels.SetVariantSelection(f"{LEVELS}{number}")
         with levels.GetVariantEditContext():
-            for kind, mesh in level.parts:
-                _write_mesh(pxr, stage, f"{path}/{kind}", mesh, variant.surfaces[kind])
+            _write_level(pxr, stage, f"{path}/{variant.name}_{LEVELS}{number}", level, variant)
     levels.SetVariantSelection(f"{LEVELS}0")
     ends = [level.distance for level in variant.levels[1:]]
     sizes = [level.screen_size(variant.height) for level in variant.levels]
@@ -178,25 +178,32 @@ def _write_variant(pxr: SimpleNamespace, stage: object, path: str, variant: Vari
     prim.SetCustomDataByKey(KEY, {**told, "height": variant.height})
 
 
-def _write_mesh(pxr: SimpleNamespace, stage: object, path: str, mesh: MeshBuffers, surface: BakedSurface) -> None:
+def _write_level(pxr: SimpleNamespace, stage: object, path: str, level: PlantLevel, variant: Variant) -> None:
+    """One mesh, of which kinds of parts are subsets: Unreal knows levels that are one each."""
+    meshes = [mesh for _, mesh in level.parts]
+    mesh = concatenate_buffers(meshes)
     made = pxr.UsdGeom.Mesh.Define(stage, path)
     made.CreateSubdivisionSchemeAttr(pxr.UsdGeom.Tokens.none)
     made.CreatePointsAttr(_array(pxr, "Vec3f", mesh.positions))
     made.CreateFaceVertexCountsAttr(_array(pxr, "Int", np.diff(mesh.face_offsets).astype(np.int32)))
     made.CreateFaceVertexIndicesAttr(_array(pxr, "Int", mesh.corner_verts))
-    made.CreateDoubleSidedAttr(surface.sided)
+    made.CreateDoubleSidedAttr(True)
     ends = np.stack([mesh.positions.min(axis=0), mesh.positions.max(axis=0)])
     made.CreateExtentAttr(_array(pxr, "Vec3f", ends))
-    # Blender smooths what has no normals, leaves too, and in EEVEE these are a quarter darker then.
-    made.CreateNormalsAttr(_array(pxr, "Vec3f", vertex_normals(mesh) if mesh.smooth else face_normals(mesh)))
-    made.SetNormalsInterpolation(pxr.UsdGeom.Tokens.vertex if mesh.smooth else pxr.UsdGeom.Tokens.uniform)
+    made.CreateNormalsAttr(_array(pxr, "Vec3f", np.concatenate([corner_normals(one) for one in meshes])))
+    made.SetNormalsInterpolation(pxr.UsdGeom.Tokens.faceVarying)
     primvars, types, tokens = pxr.UsdGeom.PrimvarsAPI(made), pxr.Sdf.ValueTypeNames, pxr.UsdGeom.Tokens
     uv, color = (mesh.attributes[name][1] for name in ("UVMap", "tf_color"))
     _add_indexed(pxr, primvars.CreatePrimvar("st", types.TexCoord2fArray, tokens.faceVarying), "Vec2f", uv)
     color = np.rint(color * _TONES) / np.float32(_TONES)
     _add_indexed(pxr, primvars.CreatePrimvar("displayColor", types.Color3fArray, tokens.uniform), "Vec3f", color)
-    material = pxr.UsdShade.Material.Get(stage, _material(surface))
-    pxr.UsdShade.MaterialBindingAPI.Apply(made.GetPrim()).Bind(material)
+    binding, first = pxr.UsdShade.MaterialBindingAPI.Apply(made.GetPrim()), 0
+    for kind, one in level.parts:
+        faces = np.arange(first, first + one.polygons, dtype=np.int32)
+        subset = binding.CreateMaterialBindSubset(kind, _array(pxr, "Int", faces)).GetPrim()
+        material = pxr.UsdShade.Material.Get(stage, _material(variant.surfaces[kind]))
+        pxr.UsdShade.MaterialBindingAPI.Apply(subset).Bind(material)
+        first += one.polygons
 
 
 def _add_indexed(pxr: SimpleNamespace, primvar: object, kind: str, values: NDArray) -> None:
