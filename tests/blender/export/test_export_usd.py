@@ -144,12 +144,16 @@ def test_usd_finds_no_fault_and_counts_the_plants(blender, tmp_path, pxr):
         assert 0 < polygons[-1] < polygons[0] <= 3000
 
 
-def test_points_of_another_program_become_plants(blender, tmp_path, pxr):
+@pytest.mark.parametrize("moving", [False, True])
+def test_points_of_another_program_become_plants(blender, tmp_path, pxr, moving):
     stage = pxr.Usd.Stage.CreateNew(str(tmp_path / "cloud.usda"))
     pxr.UsdGeom.SetStageUpAxis(stage, pxr.UsdGeom.Tokens.y)
     pxr.UsdGeom.SetStageMetersPerUnit(stage, 0.01)
     cloud = pxr.UsdGeom.Points.Define(stage, "/cloud")
-    cloud.CreatePointsAttr([(100.0, 200.0, -300.0), (0.0, 0.0, 0.0)])
+    points = [(100.0, 200.0, -300.0), (0.0, 0.0, 0.0)]
+    for time in (7.0, 8.0) if moving else (pxr.Usd.TimeCode.Default(),):  # of several moments the first counts
+        cloud.CreatePointsAttr().Set(points, time)
+        points = [(1.0, 1.0, 1.0)]
     stage.GetRootLayer().Save()
     imported(tmp_path / "cloud.usda")
     found = plants()

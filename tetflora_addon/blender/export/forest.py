@@ -102,7 +102,8 @@ def variants_of(
             one = own.take(slice(plant, plant + 1))
             like = yield from call_in_thread(progress, levels_of, kind.flora, one, number_of_levels, like)
             small = tuple(level for level in like if level.polygons <= most_polygons) if most_polygons else like
-            made.append((f"{species_of(kind.name)}_{count + 1}", small or like[-1:], _height(like), kind))
+            high = max(float(mesh.positions[:, 2].max()) for _, mesh in like[0].parts)
+            made.append((f"{species_of(kind.name)}_{count + 1}", small or like[-1:], high, kind))
             more = _faces(made[-1][1])  # and as many for each of those to come
             expected = faces + more * (len(chosen.plants) - count)
             check_fits(f"Variants of {kind.species.name}", expected, left, "or lower Variants or Max Polygons")
@@ -119,10 +120,6 @@ def _faces(levels: Sequence[PlantLevel]) -> Floats:
     meshes = [mesh for level in levels for _, mesh in level.parts]
     polygons = sum(mesh.polygons for mesh in meshes)
     return np.array([polygons, sum(len(mesh.corner_verts) for mesh in meshes) - 2.0 * polygons])
-
-
-def _height(levels: Sequence[PlantLevel]) -> float:
-    return max(float(mesh.positions[:, 2].max()) for _, mesh in levels[0].parts)
 
 
 def read_plants(data: JobData) -> tuple[list[Source], Seeds]:

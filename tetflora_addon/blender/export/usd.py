@@ -265,7 +265,7 @@ def read_parts(path: Path) -> Iterator[tuple[str, dict, PointAttributes]]:
     """Plants of a file: for each instancer or cloud of points its name, custom data, and attributes of its points.
 
     Points that TetFlora has not written have the data ``{}``, and attributes in the world: places, and where they are
-    told rotations, scales, and numbers that are named as those of fields.
+    told scales, and numbers that are named as those of fields.
 
     Raises
     ------
@@ -308,23 +308,23 @@ def _numbers(kind: str, values: object) -> NDArray:
 
 
 def _other_points(pxr: SimpleNamespace, prim: object) -> PointAttributes:
-    """What a foreign file tells of its points, in the world."""
-    is_instancer = prim.IsA(pxr.UsdGeom.PointInstancer)
-    places = np.array(prim.GetAttribute("positions" if is_instancer else "points").Get() or []).reshape(-1, 3)
+    """What a foreign file tells of its points, in the world, at the first moment that it has."""
+    is_instancer, time = prim.IsA(pxr.UsdGeom.PointInstancer), pxr.Usd.TimeCode.EarliestTime()
+    places = np.array(prim.GetAttribute("positions" if is_instancer else "points").Get(time) or []).reshape(-1, 3)
     number = len(places)
     up = pxr.UsdGeom.GetStageUpAxis(prim.GetStage())
-    world = np.array(pxr.UsdGeom.XformCache().GetLocalToWorldTransform(prim)).T
+    world = np.array(pxr.UsdGeom.XformCache(time).GetLocalToWorldTransform(prim)).T
     world = world * np.array([pxr.UsdGeom.GetStageMetersPerUnit(prim.GetStage())] * 3 + [1.0])[:, None]
     if up == pxr.UsdGeom.Tokens.y:
         world = np.array([[1, 0, 0, 0], [0, 0, -1, 0], [0, 1, 0, 0], [0, 0, 0, 1.0]]) @ world
     found = {"position": ('FLOAT_VECTOR', (places @ world[:3, :3].T + world[:3, 3]).astype(np.float32))}
     primvars = pxr.UsdGeom.PrimvarsAPI(prim)
     for name, kind in (("seed", 'INT'), ("species", 'INT'), ("age", 'FLOAT'), ("scale", 'FLOAT')):
-        values = primvars.GetPrimvar(name).Get() if primvars.HasPrimvar(name) else None
+        values = primvars.GetPrimvar(name).Get(time) if primvars.HasPrimvar(name) else None
         values = None if values is None else np.asarray(values)
         if values is not None and values.shape == (number,) and values.dtype.kind in "iuf":
             found[name] = kind, values.astype(np.int32 if kind == 'INT' else np.float32)
-    scales = np.array(prim.GetAttribute("scales").Get() or []) if is_instancer else np.zeros(0)
+    scales = np.array(prim.GetAttribute("scales").Get(time) or []) if is_instancer else np.zeros(0)
     if "scale" not in found and scales.shape == (number, 3):
         found["scale"] = 'FLOAT', scales.mean(axis=1).astype(np.float32)
     return found
