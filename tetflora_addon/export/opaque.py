@@ -25,8 +25,8 @@ from .levels import Grid, PlantLevel
 #: between.
 _LIGHT = (
     (np.full(8, np.sqrt(0.5)), 1.0, 0.0),
-    ((np.arange(12) + 0.5) / 12, 1.0, 0.3),
-    ((np.arange(6) + 0.5) / -6, 0.4, 0.3),
+    ((np.arange(12) + 0.5) / 12, 1.0, 1 / 3),
+    ((np.arange(6) + 0.5) / -6, 0.4, 1 / 3),
 )
 #: Directions to look from, all around: those of light turn by another angle, or they would lie along these.
 _VIEWS = spiral(np.full(4, 0.2), np.arange(4), np.pi / 2.0)
