@@ -18,7 +18,6 @@ import assimp_py
 import mitsuba
 import numpy as np
 from numpy.typing import NDArray
-from PIL import Image
 
 from .side_views import SIDE, VIEWS, eyes, frame_of
 
@@ -74,23 +73,15 @@ def _transform(row: dict[str, str]) -> Any:
 
 
 def _mesh(path: Path, variant: str, material: str, mesh: Any) -> Any:
-    """A mesh of mitsuba with the outline of its texture."""
-    surface: dict[str, Any] = {"type": "twosided", "inner": {"type": "diffuse"}}
-    if "bark" not in material:
-        image = Image.open(path.with_name(f"{path.stem}_textures") / f"{material}_color.png")
-        alpha = np.asarray(image, np.float32)[..., 3:] / np.float32(255.0)
-        opacity = {"type": "bitmap", "bitmap": mitsuba.Bitmap(np.ascontiguousarray(alpha)), "raw": True}
-        surface = {"type": "mask", "opacity": opacity, "nested": surface}
-    made = mitsuba.Mesh(material, mesh.num_vertices, mesh.num_faces, has_vertex_texcoords=True)
+    """A mesh of mitsuba."""
+    made = mitsuba.Mesh(material, mesh.num_vertices, mesh.num_faces)
     values = mitsuba.traverse(made)
-    uv = np.array(mesh.texcoords[0], np.float32).reshape(mesh.num_vertices, -1)[:, :2]
     values["vertex_positions"] = np.array(mesh.vertices, np.float32).ravel()
-    values["vertex_texcoords"] = (uv * np.float32([1, -1]) + np.float32([0, 1])).ravel()
     values["faces"] = np.array(mesh.indices, np.uint32).ravel()
     values.update()
     file = path.with_name(f"{variant}_{material}.ply")
     made.write_ply(str(file))
-    return {"type": "ply", "filename": str(file), "bsdf": surface}
+    return {"type": "ply", "filename": str(file), "bsdf": {"type": "twosided", "inner": {"type": "diffuse"}}}
 
 
 if __name__ == "__main__":

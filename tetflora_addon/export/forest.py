@@ -19,7 +19,6 @@ from ..files import PART, replace
 from ..optics import FACING
 from .levels import PlantLevel
 
-CUT = 0.05  # alpha under which leaves are cut out: from afar a texture shows the mean of a cell, mostly under a half
 #: Light from everywhere that surfaces mirror: a row for each roughness, for indices of refraction. Smooth ones by
 #: Fresnel's formulas, others as measured of Cycles' Principled BSDF in a white world.
 _ROUGHNESS, _INDEX = (0.0, 0.25, 0.5, 0.75, 1.0), (1.0, 1.1, 1.2, 1.3, 1.5)
@@ -53,7 +52,6 @@ class BakedSurface:
     transmission: float = 0.0
     roughness: float = 0.6
     gloss: float = 0.0  # fraction of light that is mirrored, mean of directions
-    sided: bool = False  # whether both sides of its sheets are seen
     #: Name of a texture, ``color``, ``normal`` or ``roughness``, to its file.
     textures: Mapping[str, str] = field(default_factory=dict)
 

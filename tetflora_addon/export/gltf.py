@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from ..arrays import Floats32
 from ..buffers import MeshBuffers
 from ..errors import TetFloraError
-from .forest import CUT, BakedSurface, Forest, ForestPart, Variant
+from .forest import BakedSurface, Forest, ForestPart, Variant
 from .levels import corner_triangles, triangles
 
 _FLOAT, _BYTE, _INT = 5126, 5121, 5125
@@ -120,11 +120,13 @@ def _add_material(document: _Document, folder: Path, surface: BakedSurface) -> i
     metallic |= {"baseColorTexture": textures["color"]} if "color" in textures else {}
     if "roughness" in textures:  # its blue would be the metallic part, which the factor makes 0
         metallic |= {"roughnessFactor": 1.0, "metallicRoughnessTexture": textures["roughness"]}
-    made = {"name": surface.name, "pbrMetallicRoughness": metallic, "doubleSided": surface.sided}
-    made["extensions"] = {"KHR_materials_ior": {"ior": surface.index}}
+    # Twigs of coarse levels are sheets, as leaves are.
+    made = {"name": surface.name, "pbrMetallicRoughness": metallic, "doubleSided": True}
+    made |= {
+        "extensions": {"KHR_materials_ior": {"ior": surface.index}},
+        "extras": {"transmission": surface.transmission},
+    }
     made |= {"normalTexture": textures["normal"]} if "normal" in textures else {}
-    if surface.sided:
-        made |= {"alphaMode": "MASK", "alphaCutoff": CUT, "extras": {"transmission": surface.transmission}}
     return document.add("materials", made)
 
 
@@ -178,7 +180,6 @@ def _primitive(document: _Document, mesh: MeshBuffers, material: int) -> dict[st
     owner, corner = corner_triangles(mesh)
     corners, owner = corner.reshape(-1), np.repeat(owner, 3)
     rows = np.column_stack([mesh.corner_verts[corners], mesh.attributes["UVMap"][1][corners].view(np.int32)])
-    normal = vertex_normals(mesh)[mesh.corner_verts[corners]] if mesh.smooth else face_normals(mesh)[owner]
     rows = rows if mesh.smooth else np.column_stack([rows, owner])
     key = np.ascontiguousarray(rows, np.int32).view([("", np.int32)] * rows.shape[1])[:, 0]
     _, first, index = np.unique(key, return_index=True, return_inverse=True)
@@ -186,7 +187,7 @@ def _primitive(document: _Document, mesh: MeshBuffers, material: int) -> dict[st
     position = upward(mesh.positions[mesh.corner_verts[corners[first]]])
     attributes = {
         "POSITION": document.accessor(position, _VERTICES, bounds=True),
-        "NORMAL": document.accessor(upward(normal[first]), _VERTICES),
+        "NORMAL": document.accessor(upward(corner_normals(mesh)[corners[first]]), _VERTICES),
         "TEXCOORD_0": document.accessor(uv, _VERTICES),
     }
     indices = document.accessor(index.reshape(-1).astype(np.uint32), _INDICES)
@@ -202,11 +203,13 @@ def face_normals(mesh: MeshBuffers) -> Floats32:
     return _unit(sums)
 
 
-def vertex_normals(mesh: MeshBuffers) -> Floats32:
-    """Unit normals (v, 3) of vertices, means of those of their faces."""
-    face, normal = np.repeat(np.arange(mesh.polygons), np.diff(mesh.face_offsets)), face_normals(mesh)
-    sums = [np.bincount(mesh.corner_verts, normal[face, k], len(mesh.positions)) for k in range(3)]
-    return _unit(np.stack(sums, axis=1))
+def corner_normals(mesh: MeshBuffers) -> Floats32:
+    """Unit normals (c, 3) of corners: of smooth meshes means of those of the faces around."""
+    normal = np.repeat(face_normals(mesh), np.diff(mesh.face_offsets), axis=0)
+    if not mesh.smooth:
+        return normal
+    sums = [np.bincount(mesh.corner_verts, normal[:, k], len(mesh.positions)) for k in range(3)]
+    return _unit(np.stack(sums, axis=1))[mesh.corner_verts]
 
 
 def _unit(vectors: NDArray[np.float64]) -> Floats32:

@@ -109,24 +109,11 @@ def grown(shown: NDArray[np.bool_], texels: int) -> NDArray[np.bool_]:
     return shown
 
 
-def atlas(palette: Palette, detail: Floats32, shown: NDArray[np.bool_] | None = None) -> Floats32:
-    """Texels (h, w, 3 or 4) of an atlas, row 0 lowest, linear RGB with what is cut out.
-
-    Parameters
-    ----------
-    detail : (t, t, 3) float32
-        Factors on colors, whose mean within the outline is 1.
-    shown : (t, t) bool, optional
-        Outline of leaves in a cell.
-    """
+def atlas(palette: Palette, detail: Floats32) -> Floats32:
+    """Texels (h, w, 3) of an atlas, row 0 lowest, linear RGB, by factors (t, t, 3) on colors."""
     columns, rows = palette.grid
-    out = np.ones((rows * TEXELS, columns * TEXELS, 3 if shown is None else 4), np.float32)
-    for cell, color in enumerate(palette.colors):
-        y, x = TEXELS * (cell // columns), TEXELS * (cell % columns)
-        out[y : y + TEXELS, x : x + TEXELS, :3] = color * detail
-        if shown is not None:
-            out[y : y + TEXELS, x : x + TEXELS, 3] = shown
-    return out
+    colors = palette.colors.reshape(rows, 1, columns, 1, 3)
+    return (colors * detail[:, None]).reshape(rows * TEXELS, columns * TEXELS, 3)
 
 
 def within(detail: Floats32) -> Floats32:
@@ -149,14 +136,9 @@ def tiled(texels: Floats32) -> Floats32:
 
 
 def halved(texels: Floats32) -> Floats32:
-    """Texels of an image of half the size; colors count by what is not cut out."""
+    """Texels of an image of half the size."""
     h, w, n = texels.shape
-    parts = texels.reshape(h // 2, 2, w // 2, 2, n)
-    if n < 4:
-        return parts.mean(axis=(1, 3))
-    weight = parts[..., 3:] + 1e-4
-    color = (parts[..., :3] * weight).sum(axis=(1, 3)) / weight.sum(axis=(1, 3))
-    return np.concatenate([color, parts[..., 3:].mean(axis=(1, 3))], axis=2)
+    return texels.reshape(h // 2, 2, w // 2, 2, n).mean(axis=(1, 3))
 
 
 def png(texels: Floats32, linear: bool = False) -> bytes:

@@ -310,7 +310,8 @@ class Grid:
         depth, face, first = np.full(number, -np.inf, np.float32), np.zeros(number, np.int64), 0
         for mesh in meshes:
             owner, corners = triangles(mesh)
-            self._draw(mesh.positions[corners], owner + first, depth, face)
+            seen = in_axes(mesh.positions, _axes(self.toward))
+            self._draw([seen[:, k][corners.T] for k in range(3)], owner + first, depth, face)
             first += mesh.polygons
         return depth, face
 
@@ -329,12 +330,12 @@ class Grid:
         ).T
         return at[:, 2] >= depth[row * self.shape[1] + column] - slack
 
-    def _draw(self, corners: Floats32, owner: Integers, depth: Floats32, face: Integers) -> None:
-        """Put triangles (t, 3, 3) of faces (t,) into the cells where they are the nearest."""
+    def _draw(self, corners: Sequence[Floats32], owner: Integers, depth: Floats32, face: Integers) -> None:
+        """Put triangles of faces (t,) into the cells where they are nearest, by coordinates (3, t) of their corners."""
         rows, columns = self.shape
-        x, y, z = (in_axes(corners, _axes(self.toward))[..., k].T for k in range(3))  # each (3, t)
+        *flat, z = corners
         # Middles of cells are whole numbers.
-        x, y = (of / np.float32(self.cell) - np.float32(low + 0.5) for of, low in zip((x, y), self.low, strict=True))
+        x, y = (of / np.float32(self.cell) - np.float32(low + 0.5) for of, low in zip(flat, self.low, strict=True))
         left, below = (np.maximum(np.ceil(_least(of)), 0.0).astype(np.int32) for of in (x, y))
         wide = np.minimum(np.floor(-_least(-x)), columns - 1).astype(np.int32) - left + 1
         tall = np.minimum(np.floor(-_least(-y)), rows - 1).astype(np.int32) - below + 1
@@ -344,17 +345,18 @@ class Grid:
             of, index = spread((wide[own] * tall[own]).astype(np.int64))
             of = own[of]
             column, row = left[of] + index % wide[of], below[of] + index // wide[of]
-            ax, ay = x[:, of] - column, y[:, of] - row
+            ax, ay = x[:, of] - column.astype(np.float32), y[:, of] - row.astype(np.float32)
             weights = [ax[i] * ay[j] - ay[i] * ax[j] for i, j in ((1, 2), (2, 0), (0, 1))]
             inside = np.flatnonzero((_least(weights) >= 0.0) | (-_least([-w for w in weights]) <= 0.0))
             of, weights = of[inside], [w[inside] for w in weights]
             total = weights[0] + weights[1] + weights[2]
             near = sum(w * z[k, of] for k, w in enumerate(weights)) / np.where(total == 0.0, 1.0, total)
             cell = row[inside] * columns + column[inside]
-            order = np.lexsort([near, cell])  # of each cell the nearest comes last
-            last = order[np.append(np.diff(cell[order]) > 0, True)] if len(order) else order
-            last = last[near[last] > depth[cell[last]]]
-            depth[cell[last]], face[cell[last]] = near[last], owner[of[last]]
+            nearer = np.flatnonzero(near > depth[cell])
+            near, cell, of = near[nearer], cell[nearer], of[nearer]
+            np.maximum.at(depth, cell, near)
+            kept = near == depth[cell]
+            face[cell[kept]] = owner[of[kept]]
 
 
 def _least(parts: Sequence[Floats32]) -> Floats32:

@@ -19,12 +19,14 @@ from ..optics import PALER, THROUGH_TINT
 from .gltf import face_normals
 from .levels import Grid, PlantLevel
 
-#: Heights of light, each in how many directions, and the irradiance of level ground from above or below: as much from
-#: the sun at 45 degrees as from the sky, and what the ground reflects, a fifth.
+#: Heights of light, each in how many directions; the irradiance of level ground from above or below, as much from the
+#: sun at 45 degrees as from the sky, and what the ground reflects, a fifth; and the part that shadows let through. Of
+#: the sky they let none through where paths are traced, all in EEVEE, where leaves are brighter for it: colors are in
+#: between.
 _LIGHT = (
-    (np.full(8, np.sqrt(0.5)), 1.0),
-    ((np.arange(12) + 0.5) / 12, 1.0),
-    ((np.arange(6) + 0.5) / -6, 0.4),
+    (np.full(8, np.sqrt(0.5)), 1.0, 0.0),
+    ((np.arange(12) + 0.5) / 12, 1.0, 1 / 3),
+    ((np.arange(6) + 0.5) / -6, 0.4, 1 / 3),
 )
 #: Directions to look from, all around: those of light turn by another angle, or they would lie along these.
 _VIEWS = spiral(np.full(4, 0.2), np.arange(4), np.pi / 2.0)
@@ -72,17 +74,17 @@ def _sides(meshes: Sequence[MeshBuffers]) -> Floats:
     points, normal = (np.concatenate(of) for of in ([m.positions for m in meshes], [face_normals(m) for m in meshes]))
     part = np.repeat(np.arange(len(meshes)), [mesh.polygons for mesh in meshes])
     cell = float(np.ptp(points, axis=0).max()) / _CELLS
-    lamps = [(Grid.around(toward, cell, points, cell), bright) for toward, bright in _lamps()]
-    shadows = [lamp.nearest(meshes)[0] for lamp, _ in lamps]
+    lamps = [(Grid.around(toward, cell, points, cell), *more) for toward, *more in _lamps()]
+    shadows = [lamp.nearest(meshes)[0] for lamp, *_ in lamps]
     found, every = np.zeros((3, len(meshes))), np.zeros(len(meshes))
     for grid in (Grid.around(toward, cell, points, cell) for toward in _VIEWS):
         depth, face = grid.nearest(meshes)
         face, place = face[depth > -np.inf], grid.places(depth)
         front = normal[face] @ grid.toward > 0.0
-        for (lamp, bright), shadow in zip(lamps, shadows, strict=True):
+        for (lamp, bright, passing), shadow in zip(lamps, shadows, strict=True):
             falls = normal[face] @ lamp.toward
             light = bright * np.abs(falls)
-            seen = light * lamp.reaches(place, shadow, _SLACK * cell)
+            seen = light * np.where(lamp.reaches(place, shadow, _SLACK * cell), 1.0, passing)
             kinds = np.where(front == (falls > 0.0), np.where(front, 0, 1), 2)
             np.add.at(found, (kinds, part[face]), seen)
             np.add.at(every, part[face], light)
@@ -90,7 +92,7 @@ def _sides(meshes: Sequence[MeshBuffers]) -> Floats:
     return np.column_stack([*(found / np.maximum(found[:2].sum(axis=0), 1e-30)), shaded])
 
 
-def _lamps() -> Iterator[tuple[Floats, float]]:
-    """Directions (3,) to light, and the irradiance from each of what faces it."""
-    for z, level in _LIGHT:
-        yield from ((toward, level / np.abs(z).sum()) for toward in spiral(z, np.arange(len(z)), GOLDEN_ANGLE))
+def _lamps() -> Iterator[tuple[Floats, float, float]]:
+    """Directions (3,) to light, the irradiance from each of what faces it, and what of it shadows let through."""
+    for z, level, passing in _LIGHT:
+        yield from ((toward, level / np.abs(z).sum(), passing) for toward in spiral(z, np.arange(len(z)), GOLDEN_ANGLE))

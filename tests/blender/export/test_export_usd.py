@@ -14,7 +14,7 @@ from devtools import session
 from tests.blender.scenes import add_plant, datablocks, depsgraph
 from tests.limits import full_disk
 from tetflora_addon.blender import compat
-from tetflora_addon.blender.attributes import image_pixels, linear_rgb, values_of
+from tetflora_addon.blender.attributes import image_pixels, linear_rgb, members, values_of
 from tetflora_addon.blender.export.forest import ExportOrder, export_steps
 from tetflora_addon.blender.export.usd import forest_steps
 from tetflora_addon.blender.geodata.origin import Import
@@ -135,18 +135,25 @@ def test_usd_finds_no_fault_and_counts_the_plants(blender, tmp_path, pxr):
         polygons = []
         for name in levels.GetVariantNames():
             levels.SetVariantSelection(name)
-            meshes = [pxr.UsdGeom.Mesh(p) for p in prim.GetChildren()]
-            polygons.append(sum(len(mesh.GetFaceVertexCountsAttr().Get()) for mesh in meshes))
+            (mesh,) = prim.GetChildren()  # Unreal reads levels that are one mesh each
+            assert mesh.GetName() == f"{prim.GetName()}_{name}"
+            polygons.append(len(pxr.UsdGeom.Mesh(mesh).GetFaceVertexCountsAttr().Get()))
+            subsets = [pxr.UsdGeom.Subset(p).GetIndicesAttr().Get() for p in mesh.GetChildren()]
+            np.testing.assert_array_equal(np.concatenate(subsets), np.arange(polygons[-1]))
         assert polygons == sorted(polygons, reverse=True)
         assert 0 < polygons[-1] < polygons[0] <= 3000
 
 
-def test_points_of_another_program_become_plants(blender, tmp_path, pxr):
+@pytest.mark.parametrize("moving", [False, True])
+def test_points_of_another_program_become_plants(blender, tmp_path, pxr, moving):
     stage = pxr.Usd.Stage.CreateNew(str(tmp_path / "cloud.usda"))
     pxr.UsdGeom.SetStageUpAxis(stage, pxr.UsdGeom.Tokens.y)
     pxr.UsdGeom.SetStageMetersPerUnit(stage, 0.01)
     cloud = pxr.UsdGeom.Points.Define(stage, "/cloud")
-    cloud.CreatePointsAttr([(100.0, 200.0, -300.0), (0.0, 0.0, 0.0)])
+    points = [(100.0, 200.0, -300.0), (0.0, 0.0, 0.0)]
+    for time in (7.0, 8.0) if moving else (pxr.Usd.TimeCode.Default(),):  # of several moments the first counts
+        cloud.CreatePointsAttr().Set(points, time)
+        points = [(1.0, 1.0, 1.0)]
     stage.GetRootLayer().Save()
     imported(tmp_path / "cloud.usda")
     found = plants()
@@ -178,6 +185,16 @@ def test_a_full_disk_leaves_no_half_file(blender, tmp_path, suffix, pxr):
         export(path)
     assert [p.name for p in tmp_path.iterdir()] == [path.name]
     assert path.read_text() == "an earlier one"
+
+
+def test_variants_beyond_max_memory_are_refused(blender, tmp_path, monkeypatch):
+    """All plants may be different, up to what fits; levels with too many polygons do not count."""
+    field()
+    monkeypatch.setattr("tetflora_addon.blender.export.forest.memory_left", lambda _scene: 2e6)
+    with pytest.raises(TetFloraError, match=r"Variants of \w+ would make more than .* lower Variants or Max Polygons"):
+        export(tmp_path / "f.obj", variants=30)
+    assert list(tmp_path.iterdir()) == []
+    assert export(tmp_path / "f.obj", variants=2, polygons=300).variants == 4
 
 
 def test_closing_the_steps_leaves_no_half_file(blender, tmp_path, pxr):
@@ -212,15 +229,24 @@ def test_blender_reads_the_plant_with_its_textures(blender, tmp_path, pxr):
     assert not [image for image in bpy.data.images if image.type == 'UV_TEST' or "bake" in image.name]
     session.clean_file()
     assert bpy.ops.wm.usd_import(filepath=str(tmp_path / "f.usdc")) == {'FINISHED'}
-    leaf = next(o for o in bpy.data.objects if o.name.startswith("leaf"))
-    assert len(leaf.data.polygons) > 1000
+    mesh = next(o.data for o in bpy.data.objects if o.name == "bush_1_LOD0")
+    leaf = members(mesh.polygons, "material_index", dtype=np.int32) == mesh.materials.find("bush_leaf")
+    assert leaf.sum() > 1000
+    # EEVEE blends what a texture could cut, in any order; and leaves without normals would be smoothed.
+    assert {material.surface_render_method for material in mesh.materials} == {'DITHERED'}
+    size, corners = members(mesh.polygons, "loop_total", dtype=np.int32), members(mesh.corner_normals, "vector", 3)
+    flat = np.repeat(members(mesh.polygon_normals, "vector", 3), size, axis=0)
+    bent = np.linalg.norm(corners - flat, axis=1) > 0.01
+    assert not bent[np.repeat(leaf, size)].any()
+    assert bent[np.repeat(~leaf, size)].mean() > 0.5
     images = {Path(image.filepath).name: image for image in bpy.data.images if image.size[0]}
     kinds = ("leaf_color", "leaf_normal", "bark_color", "bark_roughness")  # the own bark has no relief
     assert set(images) == {f"bush_{kind}.png" for kind in kinds}
     assert image_pixels(images["bush_bark_roughness.png"])[..., 0].std() > 0.1
     pixels = linear_rgb(images["bush_leaf_color.png"], image_pixels(images["bush_leaf_color.png"]))
-    shown = image_pixels(images["bush_leaf_color.png"])[..., 3] > 0.5
-    color = values_of(leaf.data.attributes["displayColor"]).mean(axis=0)[:3]
+    outline = bpy.data.images.load(str(tmp_path / "f_textures" / "bush_leaf_opacity.png"))
+    shown = image_pixels(outline)[..., 0] > 0.5
+    color = values_of(mesh.attributes["displayColor"])[np.repeat(leaf, size)].mean(axis=0)[:3]
     np.testing.assert_allclose(pixels[shown].mean(axis=0), color, rtol=0.15)
     assert pixels[shown].std(axis=0).max() > 0.005  # veins and shades
 

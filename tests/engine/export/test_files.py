@@ -25,7 +25,18 @@ from tetflora_addon.export.forest import (
     written_whole,
 )
 from tetflora_addon.export.gltf import write_gltf
-from tetflora_addon.export.images import LEAVES, TEXELS, atlas, halved, in_atlas, outline, palette_of, png, tiled
+from tetflora_addon.export.images import (
+    LEAVES,
+    TEXELS,
+    Palette,
+    atlas,
+    halved,
+    in_atlas,
+    outline,
+    palette_of,
+    png,
+    tiled,
+)
 from tetflora_addon.export.levels import levels_of
 from tetflora_addon.export.obj import write_obj
 from tetflora_addon.growth.seeds import Seeds
@@ -39,7 +50,7 @@ NUMBER = 7
 def forest() -> Forest:
     """Some plants of one variant, far from the origin, turned about an oblique axis."""
     levels = levels_of(compile_species([load_species("bush")]), Seeds.upright(1), 3)
-    looks = {part: BakedSurface(f"bush_{part}", (0.1, 0.2, 0.05), sided=part != "bark") for part, _ in levels[0].parts}
+    looks = {part: BakedSurface(f"bush_{part}", (0.1, 0.2, 0.05)) for part, _ in levels[0].parts}
     rng, each = np.random.default_rng(2), np.zeros(NUMBER, np.int32)
     turn = rng.normal(size=(NUMBER, 4))
     turn /= np.linalg.norm(turn, axis=1, keepdims=True)
@@ -63,6 +74,8 @@ def test_gltf_has_all_places_and_levels(forest, tmp_path):
     list(write_gltf(path, forest))
     assert [p.name for p in tmp_path.iterdir()] == ["f.glb"]
     read = pygltflib.GLTF2().load(str(path))
+    # Polygons have the outlines of leaves, and twigs are sheets, too.
+    assert {(m.alphaMode, m.doubleSided) for m in read.materials} == {("OPAQUE", True)}
     assert set(read.extensionsUsed) == {"EXT_mesh_gpu_instancing", "KHR_materials_ior", "MSFT_lod"}
     (root,) = read.scenes[0].nodes
     node, part = read.nodes[root], forest.parts[0]
@@ -140,16 +153,26 @@ def test_leaves_find_their_color_in_the_atlas(forest):
     palette = palette_of([leaf], LEAVES)
     shown = outline(palette, leaf)
     assert 0.2 < shown.mean() < 0.9
-    texels = atlas(palette, np.ones((TEXELS, TEXELS, 3), np.float32), shown)
+    texels = atlas(palette, np.ones((TEXELS, TEXELS, 3), np.float32))
     placed = next(mesh for part, mesh in in_atlas(level, {"leaf": palette}).parts if part == "leaf")
     uv, color = placed.attributes["UVMap"][1], leaf.attributes["tf_color"][1]
     first = placed.face_offsets[:-1]
     middle = np.add.reduceat(uv, first) / np.diff(placed.face_offsets)[:, None]
     at = (middle * len(texels)).astype(int)
     found = texels[at[:, 1], at[:, 0]]
-    assert (found[:, 3] == 1.0).mean() > 0.99
-    assert np.abs(found[:, :3] - color).max() < 0.05
-    np.testing.assert_allclose(found[:, :3].mean(axis=0), color.mean(axis=0), rtol=0.01)
+    assert shown[at[:, 1] % TEXELS, at[:, 0] % TEXELS].mean() > 0.99
+    assert np.abs(found - color).max() < 0.05
+    np.testing.assert_allclose(found.mean(axis=0), color.mean(axis=0), rtol=0.01)
+
+
+def test_cells_of_an_atlas_have_their_colors_and_the_detail_of_one_leaf():
+    palette = Palette(np.arange(24, dtype=np.float32).reshape(8, 3), np.zeros(2), np.ones(2), (4, 2))
+    detail = np.random.default_rng(0).random((TEXELS, TEXELS, 3), np.float32)
+    texels = atlas(palette, detail)
+    assert texels.shape == (2 * TEXELS, 4 * TEXELS, 3)
+    for cell, color in enumerate(palette.colors):
+        y, x = (TEXELS * of for of in divmod(cell, 4))
+        np.testing.assert_array_equal(texels[y : y + TEXELS, x : x + TEXELS], color * detail)
 
 
 @pytest.mark.parametrize("channels", [3, 4])
@@ -164,9 +187,8 @@ def test_png_files_hold_what_was_given(channels):
 
 
 def test_smaller_textures_keep_colors_and_tiles_have_no_seam():
-    texels = np.ones((64, 64, 4), np.float32)
-    texels[:, :31, :3], texels[:, :31, 3] = 0.0, 0.0
-    np.testing.assert_allclose(halved(texels)[:, 16:, :3], 1.0, atol=1e-3)  # what is cut out has no color
+    texels = np.random.default_rng(0).random((6, 4, 3), np.float32)
+    np.testing.assert_allclose(halved(texels)[1, 0], texels[2:4, :2].mean(axis=(0, 1)), rtol=1e-6)
     ramp = np.tile(np.linspace(0.0, 1.0, 64, dtype=np.float32)[:, None, None], (1, 4, 3))
     steps = np.abs(np.diff(np.concatenate([tiled(ramp)] * 2), axis=0))
     assert steps.max() < 0.1 < np.abs(np.diff(np.concatenate([ramp] * 2), axis=0)).max()

@@ -56,6 +56,13 @@ def test_shade_of_the_plant_itself_counts():
     assert (roofed > 1.2 * open_).all()
 
 
+def test_light_of_the_sky_falls_on_what_is_shaded_for_those_who_see_no_shadows_of_it():
+    """Below a roof it would otherwise be light from the ground alone, which all passes through."""
+    leaf = replace(sheet(PASSED), positions=sheet(PASSED).positions + np.float32([4.5, 4.5, 0.0]))
+    _, _, through, _ = sides_of([PlantLevel((("leaf", leaf), ("bark", sheet(0.0, 1, 10))), 0.0)])["leaf"]
+    assert 0.5 < through < 2.0
+
+
 def test_all_levels_have_the_sides_of_the_first():
     leaf = sheet(PASSED)
     levels = [PlantLevel((("leaf", leaf), ("bark", sheet(0.0, -1.0))), 0.0)]

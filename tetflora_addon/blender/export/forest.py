@@ -27,7 +27,7 @@ from ...jobs import Job, Progress, part_of
 from ...species.kinds import species_of
 from ...species.species import Species
 from ..attributes import world_matrix
-from ..job.contents import compile_for, in_year
+from ..job.contents import check_fits, compile_for, in_year, memory_left
 from ..runtime import JobData, job
 from ..scene.ages import classed
 from ..scene.fields import AGE, FIT, NUMBERS, OFFSET, stored_points
@@ -82,10 +82,11 @@ def variants_of(
     kinds: Sequence[PlantKind],
     number_of_levels: int,
     most_polygons: int,
+    left: float = np.inf,
 ) -> Job[Shown]:
-    """Choose variants of all kinds, and make these."""
-    variant, scale = np.zeros(len(seeds), np.int32), np.ones(len(seeds))
-    made: list[tuple[str, tuple[PlantLevel, ...], PlantKind]] = []
+    """Choose variants of all kinds, and make these; what would not fit into so many bytes is refused."""
+    variant, scale, faces = np.zeros(len(seeds), np.int32), np.ones(len(seeds)), np.zeros(2)
+    made: list[tuple[str, tuple[PlantLevel, ...], float, PlantKind]] = []
     for number, kind in enumerate(kinds):
         progress = Progress(number / len(kinds), f"variants of {kind.species.name}")
         yield progress
@@ -98,17 +99,25 @@ def variants_of(
             progress = Progress(share, f"{kind.species.name}, variant {count + 1} of {len(chosen.plants)}")
             one = own.take(slice(plant, plant + 1))
             like = yield from call_in_thread(progress, levels_of, kind.flora, one, number_of_levels, like)
-            made.append((f"{species_of(kind.name)}_{count + 1}", like, kind))
-    names = identifiers([name for name, *_ in made])
-    variants = []
-    for name, (_, own, kind) in zip(names, made, strict=True):
-        small = tuple(level for level in own if level.polygons <= most_polygons) if most_polygons else own
-        variants.append(Variant(name, kind.species.identifier, small or own[-1:], _height(own), {}))
+            small = tuple(level for level in like if level.polygons <= most_polygons) if most_polygons else like
+            high = max(float(mesh.positions[:, 2].max()) for _, mesh in like[0].parts)
+            made.append((f"{species_of(kind.name)}_{count + 1}", small or like[-1:], high, kind))
+            more = _faces(made[-1][1])  # and as many for each of those to come
+            expected = faces + more * (len(chosen.plants) - count)
+            check_fits(f"Variants of {kind.species.name}", expected, left, "or lower Variants or Max Polygons")
+            faces += more
+    variants = [
+        Variant(name, kind.species.identifier, levels, height, {})
+        for name, (_, levels, height, kind) in zip(identifiers([name for name, *_ in made]), made, strict=True)
+    ]
     return Shown(tuple(variants), variant, scale)
 
 
-def _height(levels: Sequence[PlantLevel]) -> float:
-    return max(float(mesh.positions[:, 2].max()) for _, mesh in levels[0].parts)
+def _faces(levels: Sequence[PlantLevel]) -> Floats:
+    """Polygons of levels, and the triangles (2,) that they consist of."""
+    meshes = [mesh for level in levels for _, mesh in level.parts]
+    polygons = sum(mesh.polygons for mesh in meshes)
+    return np.array([polygons, sum(len(mesh.corner_verts) for mesh in meshes) - 2.0 * polygons])
 
 
 def read_plants(data: JobData) -> tuple[list[Source], Seeds]:
@@ -248,7 +257,8 @@ def export_steps(data: JobData, order: ExportOrder) -> Job[Exported]:
         yield Progress(0.0, "reading plants")
         sources, seeds = read_plants(data)
         kinds = yield from part_of(kinds_of(data, seeds, order.variants), 0.05, 0.15)
-        shown = yield from part_of(variants_of(seeds, kinds, order.levels, order.polygons), 0.15, 0.65)
+        left = memory_left(data.scene)
+        shown = yield from part_of(variants_of(seeds, kinds, order.levels, order.polygons, left), 0.15, 0.65)
         textures = f"{identifiers([order.path.stem])[0]}_textures"
         given = data.scene, shown.variants, folder, textures, order.bake
         variants = yield from part_of(with_surfaces(*given), 0.65, 0.75)

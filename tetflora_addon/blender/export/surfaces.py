@@ -138,9 +138,10 @@ def _surface(scene: bpy.types.Scene, look: _Look, folder: Path, textures: str, b
     shown = None if is_bark else np.any([outline(look.palette, mesh) for mesh in look.meshes], axis=0)
     seen = detail.reshape(-1, 3) if shown is None else detail[shown]
     detail = detail / np.maximum(seen.mean(axis=0), 1e-6)
-    files = {"color": atlas(look.palette, detail, shown)}
-    for key in images.keys() - files.keys():
-        files[key] = np.tile(images[key], (*look.palette.grid[::-1], 1))
+    # Not as alpha of colors, which EEVEE multiplies by it: outlines are for cards, and polygons need none.
+    images |= {} if shown is None else {"opacity": shown[..., None].astype(np.float32)}
+    files = {key: np.tile(texels, (*look.palette.grid[::-1], 1)) for key, texels in images.items()}
+    files["color"] = atlas(look.palette, detail)
     names = {}
     for key, texels in files.items():
         names[key] = f"{textures}/{look.name}_{key}.png"
@@ -148,8 +149,9 @@ def _surface(scene: bpy.types.Scene, look: _Look, folder: Path, textures: str, b
         (folder / names[key]).write_bytes(png(texels, linear=key != "color"))
         half = png(halved(texels), linear=key != "color")
         (folder / textures / f"{look.name}_{key}_half.png").write_bytes(half)
+    names.pop("opacity", None)
     color = tuple(look.color.tolist())
-    return BakedSurface(look.name, color, look.mean("tf_transmission"), rough, gloss, not is_bark, names)
+    return BakedSurface(look.name, color, look.mean("tf_transmission"), rough, gloss, names)
 
 
 def _meters(mesh: MeshBuffers) -> float:

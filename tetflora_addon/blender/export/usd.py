@@ -20,10 +20,11 @@ from mathutils import Matrix
 from numpy.typing import NDArray
 
 from ...arrays import Integers
-from ...buffers import MeshBuffers
+from ...buffers import concatenate_buffers
 from ...errors import SceneError, TetFloraError, listed
-from ...export.forest import CUT, BakedSurface, Forest, ForestPart, PointAttributes, Variant, identifiers
-from ...export.gltf import vertex_normals
+from ...export.forest import BakedSurface, Forest, ForestPart, PointAttributes, Variant, identifiers
+from ...export.gltf import corner_normals
+from ...export.levels import PlantLevel
 from ...growth.hashing import child_key, key_of_seed, uniform
 from ...jobs import Progress
 from ...planting.rules import species_by_weight
@@ -169,8 +170,7 @@ def _write_variant(pxr: SimpleNamespace, stage: object, path: str, variant: Vari
         levels.AddVariant(f"{LEVELS}{number}")
         levels.SetVariantSelection(f"{LEVELS}{number}")
         with levels.GetVariantEditContext():
-            for kind, mesh in level.parts:
-                _write_mesh(pxr, stage, f"{path}/{kind}", mesh, variant.surfaces[kind])
+            _write_level(pxr, stage, f"{path}/{variant.name}_{LEVELS}{number}", level, variant)
     levels.SetVariantSelection(f"{LEVELS}0")
     ends = [level.distance for level in variant.levels[1:]]
     sizes = [level.screen_size(variant.height) for level in variant.levels]
@@ -178,25 +178,32 @@ def _write_variant(pxr: SimpleNamespace, stage: object, path: str, variant: Vari
     prim.SetCustomDataByKey(KEY, {**told, "height": variant.height})
 
 
-def _write_mesh(pxr: SimpleNamespace, stage: object, path: str, mesh: MeshBuffers, surface: BakedSurface) -> None:
+def _write_level(pxr: SimpleNamespace, stage: object, path: str, level: PlantLevel, variant: Variant) -> None:
+    """One mesh, of which kinds of parts are subsets: Unreal knows levels that are one each."""
+    meshes = [mesh for _, mesh in level.parts]
+    mesh = concatenate_buffers(meshes)
     made = pxr.UsdGeom.Mesh.Define(stage, path)
     made.CreateSubdivisionSchemeAttr(pxr.UsdGeom.Tokens.none)
     made.CreatePointsAttr(_array(pxr, "Vec3f", mesh.positions))
     made.CreateFaceVertexCountsAttr(_array(pxr, "Int", np.diff(mesh.face_offsets).astype(np.int32)))
     made.CreateFaceVertexIndicesAttr(_array(pxr, "Int", mesh.corner_verts))
-    made.CreateDoubleSidedAttr(surface.sided)
+    made.CreateDoubleSidedAttr(True)
     ends = np.stack([mesh.positions.min(axis=0), mesh.positions.max(axis=0)])
     made.CreateExtentAttr(_array(pxr, "Vec3f", ends))
-    if mesh.smooth:
-        made.CreateNormalsAttr(_array(pxr, "Vec3f", vertex_normals(mesh)))
-        made.SetNormalsInterpolation(pxr.UsdGeom.Tokens.vertex)
+    made.CreateNormalsAttr(_array(pxr, "Vec3f", np.concatenate([corner_normals(one) for one in meshes])))
+    made.SetNormalsInterpolation(pxr.UsdGeom.Tokens.faceVarying)
     primvars, types, tokens = pxr.UsdGeom.PrimvarsAPI(made), pxr.Sdf.ValueTypeNames, pxr.UsdGeom.Tokens
     uv, color = (mesh.attributes[name][1] for name in ("UVMap", "tf_color"))
     _add_indexed(pxr, primvars.CreatePrimvar("st", types.TexCoord2fArray, tokens.faceVarying), "Vec2f", uv)
     color = np.rint(color * _TONES) / np.float32(_TONES)
     _add_indexed(pxr, primvars.CreatePrimvar("displayColor", types.Color3fArray, tokens.uniform), "Vec3f", color)
-    material = pxr.UsdShade.Material.Get(stage, _material(surface))
-    pxr.UsdShade.MaterialBindingAPI.Apply(made.GetPrim()).Bind(material)
+    binding, first = pxr.UsdShade.MaterialBindingAPI.Apply(made.GetPrim()), 0
+    for kind, one in level.parts:
+        faces = np.arange(first, first + one.polygons, dtype=np.int32)
+        subset = binding.CreateMaterialBindSubset(kind, _array(pxr, "Int", faces)).GetPrim()
+        material = pxr.UsdShade.Material.Get(stage, _material(variant.surfaces[kind]))
+        pxr.UsdShade.MaterialBindingAPI.Apply(subset).Bind(material)
+        first += one.polygons
 
 
 def _add_indexed(pxr: SimpleNamespace, primvar: object, kind: str, values: NDArray) -> None:
@@ -242,26 +249,23 @@ def _write_texture(
     image.CreateInput("wrapT", types.Token).Set("repeat")
     image.CreateInput("sourceColorSpace", types.Token).Set("sRGB" if name == "color" else "raw")
     image.CreateInput("st", types.Float2).ConnectToSource(place.ConnectableAPI(), "result")
-    inputs: Mapping[str, tuple] = {
-        "color": (("diffuseColor", "rgb", types.Color3f), ("opacity", "a", types.Float)),
-        "roughness": (("roughness", "r", types.Float),),
-        "normal": (("normal", "rgb", types.Normal3f),),
-    }
+    key, output, of = {
+        "color": ("diffuseColor", "rgb", types.Color3f),
+        "roughness": ("roughness", "r", types.Float),
+        "normal": ("normal", "rgb", types.Normal3f),
+    }[name]
     if name == "normal":
         image.CreateInput("scale", types.Float4).Set(pxr.Gf.Vec4f(2.0, 2.0, 2.0, 1.0))
         image.CreateInput("bias", types.Float4).Set(pxr.Gf.Vec4f(-1.0, -1.0, -1.0, 0.0))
-    if name == "color":  # outlines are cut out, not blended
-        shader.CreateInput("opacityThreshold", types.Float).Set(CUT)
-    for key, output, of in inputs[name]:
-        image.CreateOutput(output, types.Float if len(output) == 1 else types.Float3)
-        shader.CreateInput(key, of).ConnectToSource(image.ConnectableAPI(), output)
+    image.CreateOutput(output, types.Float if len(output) == 1 else types.Float3)
+    shader.CreateInput(key, of).ConnectToSource(image.ConnectableAPI(), output)
 
 
 def read_parts(path: Path) -> Iterator[tuple[str, dict, PointAttributes]]:
     """Plants of a file: for each instancer or cloud of points its name, custom data, and attributes of its points.
 
     Points that TetFlora has not written have the data ``{}``, and attributes in the world: places, and where they are
-    told rotations, scales, and numbers that are named as those of fields.
+    told scales, and numbers that are named as those of fields.
 
     Raises
     ------
@@ -304,23 +308,23 @@ def _numbers(kind: str, values: object) -> NDArray:
 
 
 def _other_points(pxr: SimpleNamespace, prim: object) -> PointAttributes:
-    """What a foreign file tells of its points, in the world."""
-    is_instancer = prim.IsA(pxr.UsdGeom.PointInstancer)
-    places = np.array(prim.GetAttribute("positions" if is_instancer else "points").Get() or []).reshape(-1, 3)
+    """What a foreign file tells of its points, in the world, at the first moment that it has."""
+    is_instancer, time = prim.IsA(pxr.UsdGeom.PointInstancer), pxr.Usd.TimeCode.EarliestTime()
+    places = np.array(prim.GetAttribute("positions" if is_instancer else "points").Get(time) or []).reshape(-1, 3)
     number = len(places)
     up = pxr.UsdGeom.GetStageUpAxis(prim.GetStage())
-    world = np.array(pxr.UsdGeom.XformCache().GetLocalToWorldTransform(prim)).T
+    world = np.array(pxr.UsdGeom.XformCache(time).GetLocalToWorldTransform(prim)).T
     world = world * np.array([pxr.UsdGeom.GetStageMetersPerUnit(prim.GetStage())] * 3 + [1.0])[:, None]
     if up == pxr.UsdGeom.Tokens.y:
         world = np.array([[1, 0, 0, 0], [0, 0, -1, 0], [0, 1, 0, 0], [0, 0, 0, 1.0]]) @ world
     found = {"position": ('FLOAT_VECTOR', (places @ world[:3, :3].T + world[:3, 3]).astype(np.float32))}
     primvars = pxr.UsdGeom.PrimvarsAPI(prim)
     for name, kind in (("seed", 'INT'), ("species", 'INT'), ("age", 'FLOAT'), ("scale", 'FLOAT')):
-        values = primvars.GetPrimvar(name).Get() if primvars.HasPrimvar(name) else None
+        values = primvars.GetPrimvar(name).Get(time) if primvars.HasPrimvar(name) else None
         values = None if values is None else np.asarray(values)
         if values is not None and values.shape == (number,) and values.dtype.kind in "iuf":
             found[name] = kind, values.astype(np.int32 if kind == 'INT' else np.float32)
-    scales = np.array(prim.GetAttribute("scales").Get() or []) if is_instancer else np.zeros(0)
+    scales = np.array(prim.GetAttribute("scales").Get(time) or []) if is_instancer else np.zeros(0)
     if "scale" not in found and scales.shape == (number, 3):
         found["scale"] = 'FLOAT', scales.mean(axis=1).astype(np.float32)
     return found
