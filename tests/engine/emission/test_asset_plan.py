@@ -29,7 +29,7 @@ from tetflora_addon.emission.asset_plan import (
     PlacedClusters,
     explicit_plan,
 )
-from tetflora_addon.proxies import asset_facets
+from tetflora_addon.proxies import microsurfaces
 from tetflora_addon.proxies.microsurfaces import Facets
 from tetflora_addon.refinement.decisions import Decision
 from tetflora_addon.refinement.loop import Refinement
@@ -121,7 +121,7 @@ def area(*facets: Facets) -> float:
 @pytest.mark.parametrize("fraction", [0.3, NEVER])
 def test_every_part_is_drawn_once(limit: float, fraction: float, monkeypatch: pytest.MonkeyPatch) -> None:
     """All of the area is there, as what it is or as facets; what nobody sees may be less."""
-    monkeypatch.setattr(asset_facets, "asset_weights", lambda _placed, parts, _number: np.ones(len(parts)))
+    monkeypatch.setattr(microsurfaces, "asset_weights", lambda _placed, parts, _number: np.ones(len(parts)))
     camera, result = scene()
     placed = result.assets.placed
     plan, seen, unseen = drawn(result, camera, limit, originals(fraction))
@@ -268,7 +268,7 @@ def test_facets_have_the_weights_of_their_clusters() -> None:
         sides = np.full(len(rows), side)
         made = Facets.concatenate([own for _, own in clusters.unseen(rows, sides, np.ones(len(rows)), [])])
         assert np.linalg.norm(made.normal, axis=1) == pytest.approx(1.0, abs=1e-6)
-        weight = asset_facets.asset_weights(placed, rows, rows.totals.optical_area / side**2)
+        weight = microsurfaces.asset_weights(placed, rows, rows.totals.optical_area / side**2)
         assert area(made) == pytest.approx(rows.totals.optical_area @ weight, abs=by_chance(made))
 
 
