@@ -22,7 +22,6 @@ from ..camera.camera import Camera
 from ..compiled.flora import Flora
 from ..growth.hashing import place_keys, uniform
 from ..processes.pool import in_processes
-from ..proxies.cast_shadows import ShadowReach
 from ..proxies.facet_weights import FacetWeights
 from ..proxies.microsurfaces import CIRCUMRADIUS, STRETCH, Facets, pushed_outside_view
 from ..proxies.primitives import Primitive, Triangles, joined, triangle_corners
@@ -30,7 +29,7 @@ from ..refinement.contents import polygon_totals
 from ..refinement.loop import Refinement
 from ..refinement.shared_parts import SharePoints
 from .asset_plan import PlacedClusters
-from .coverage import Coverage, Shade
+from .coverage import Coverage, Shade, ShadowReach
 from .frontier import DETAIL, FEW, Frontier, FrontierKind, Shown, Waiting, Whose
 from .plant_parts import GrownPlants, PlantRows
 from .plants import Block, Transition
