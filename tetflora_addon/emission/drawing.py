@@ -31,8 +31,7 @@ from ..refinement.shared_parts import SharePoints
 from .asset_plan import PlacedClusters
 from .coverage import Coverage, Shade, ShadowReach
 from .frontier import DETAIL, FEW, Frontier, FrontierKind, Shown, Waiting, Whose
-from .plant_parts import GrownPlants, PlantRows
-from .plants import Block, Transition
+from .plants import Block, GrownPlants, PlantRows, Transition
 from .polygons import FaceRows, Faces
 
 #: Least width of a tile, pixels, and pixels around it that its coverage knows.

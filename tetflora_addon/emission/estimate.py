@@ -39,8 +39,7 @@ from ..subplants.tubes import tube_faces
 from .budget import A_PIXEL, BYTES_PER_POLYGON, BYTES_PER_TRIANGLE, relative_side
 from .drawing import HIDDEN, HIDDEN_A_PIXEL, HIDDEN_LEAVES, LIT_LEAVES, NEVER_TOO_MANY, OUTSIDE_A_PIXEL, SHADOW
 from .frontier import DETAIL
-from .plant_parts import BENT, BROAD, SIDES, TUBES, TWIG
-from .plants import NEARER, TOLERANCE, LeafDetail, kite_widths
+from .plants import BENT, BROAD, NEARER, SIDES, TOLERANCE, TUBES, TWIG, LeafDetail, kite_widths
 
 #: Seconds of any refinement, of each plant, and of each polygon or facet that is seen, and that nobody sees: of these
 #: there are few for what is opened.

@@ -20,8 +20,7 @@ from tetflora_addon.emission.budget import fit_to_budget
 from tetflora_addon.emission.coverage import MARGIN, Coverage, Shade
 from tetflora_addon.emission.emitters import as_triangles, facet_blocks
 from tetflora_addon.emission.frontier import Frontier
-from tetflora_addon.emission.plant_parts import GrownPlants
-from tetflora_addon.emission.plants import Transition, expanded_blocks
+from tetflora_addon.emission.plants import GrownPlants, Transition, expanded_blocks
 from tetflora_addon.growth.growth import trunks
 from tetflora_addon.proxies.facet_weights import facet_weights
 from tetflora_addon.proxies.microsurfaces import Facets
