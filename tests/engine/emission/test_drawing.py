@@ -321,7 +321,7 @@ def test_qualities_are_in_order(monkeypatch: pytest.MonkeyPatch) -> None:
     from tetflora_addon.refinement.settings import QUALITIES
 
     _, _, camera, result = wood()
-    monkeypatch.setattr("tetflora_addon.emission.budget.NEVER_TOO_MANY", 60_000.0)  # for as few pixels
+    monkeypatch.setattr("tetflora_addon.emission.budget.PLENTY", 60_000.0)  # for as few pixels
     sides = []
     for name in ("FINAL", "PREVIEW", "DRAFT"):
         quality = QUALITIES[name]

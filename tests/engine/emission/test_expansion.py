@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from tests.engine import support
-from tetflora_addon.emission.estimate import expanded_faces
+from tetflora_addon.emission.budget import expanded_faces
 from tetflora_addon.emission.plants import Block, expanded_blocks
 
 

@@ -13,8 +13,7 @@ from ... import memory, parallel
 from ...arrays import Floats
 from ...camera.camera import Camera
 from ...compiled.flora import Flora, compile_species
-from ...emission.budget import BYTES_PER_TRIANGLE
-from ...emission.estimate import expanded_faces
+from ...emission.budget import BYTES_PER_TRIANGLE, expanded_faces
 from ...emission.light import Sources
 from ...errors import SceneError
 from ...growth.growth import trunks
