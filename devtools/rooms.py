@@ -62,12 +62,12 @@ _TABLE = {
     "blender/scene": ". species growth assets compiled camera refinement planting light emission "
     "blender blender/materials blender/species",
     "blender/assets": f". growth assets {_LOW}",
-    "blender/results": f". leaves species refinement emission {_LOW}",
+    "blender/results": f". leaves species refinement light emission {_LOW}",
     "blender/placing": f". species growth compiled planting {_LOW} blender/assets",
     "blender/stands": ". species compiled planting stands blender blender/species blender/scene blender/placing",
     "blender/geodata": f". species growth compiled planting geodata {_LOW} blender/placing",
     "blender/biomes": f". species growth planting {_LOW} blender/placing blender/stands",
-    "blender/job": f". processes species growth compiled camera refinement proxies emission {_LOW} {_ASSETS} "
+    "blender/job": f". processes species growth compiled camera refinement proxies light emission {_LOW} {_ASSETS} "
     "blender/results",
     "blender/viewport": f". species growth compiled tetrahedra camera refinement preview {_LOW} {_HIGH}",
     "blender/export": ". species growth compiled camera planting export blender blender/species blender/scene "

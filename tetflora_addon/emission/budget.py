@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A budget of polygons: the finest image that fits (beyond the paper, whose only limit is the cutoff); and what refining
-will take, before it is done: seconds, polygons and bytes, and what expanding plants takes.
+"""A budget of polygons: the finest image that fits (beyond the paper, whose only limit is the cutoff); and estimates of
+what refining and expanding will take: seconds, polygons and bytes.
 
 How many polygons and facets an image has follows from the pixels that plants cover: parts are drawn until these are
 full. Where facets are larger, there are fewer, as their area is. Where there are few, they may be finer than they have

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What lies behind what: coverage of the image by what is drawn, how deep in the shade things are, and where shadows fall.
+"""What lies behind what: coverage of the image, how deep in the shade things are, and where shadows fall.
 
 The paper renders front to back and keeps an alpha buffer (sections 6.3 and 7). What is drawn here is opaque, so that a
 depth for each pixel says the same: a pixel is full from the depth of what covers its center on. Where pixels are full,

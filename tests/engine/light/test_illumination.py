@@ -12,10 +12,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tests.engine import support
-from tetflora_addon.emission.light import shadow_steps
 from tetflora_addon.emission.shells import set_apart
 from tetflora_addon.light import buffers
-from tetflora_addon.light.illumination import Illumination
+from tetflora_addon.light.illumination import Illumination, shadow_steps
 from tetflora_addon.light.receivers import MediumCells, SurfaceElements
 from tetflora_addon.light.scattering import (
     DIRECTIONS,

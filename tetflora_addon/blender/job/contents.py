@@ -14,11 +14,11 @@ from ...arrays import Floats
 from ...camera.camera import Camera
 from ...compiled.flora import Flora, compile_species
 from ...emission.budget import BYTES_PER_TRIANGLE, expanded_faces
-from ...emission.light import Sources
 from ...errors import SceneError
 from ...growth.growth import trunks
 from ...growth.seeds import Seeds
 from ...growth.wind import Wind
+from ...light.illumination import Sources
 from ...processes import pool
 from ...refinement.lights import Light
 from ...refinement.loop import Outliers
