@@ -34,8 +34,7 @@ from ..growth.crown_effects import (
     trunk_length_factors,
 )
 from ..growth.foliage import YOUTH
-from ..growth.grown_rows import NOW, fullness_of, lengths, living, spread_children
-from ..growth.rows import DEAD, FORK, LATERAL, SPUR
+from ..growth.rows import DEAD, FORK, LATERAL, NOW, SPUR, fullness_of, lengths, living, spread_children
 from ..growth.seeds import BASE, LEAVES, MOST, WIDTH, Branches
 from ..leaves.levels import hidden_gloss
 from ..leaves.models import LeafModel

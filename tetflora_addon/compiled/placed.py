@@ -20,8 +20,7 @@ from ..growth.crown_effects import (
     length_factors,
     trunk_length_factors,
 )
-from ..growth.grown_rows import lengths
-from ..growth.rows import FORK, LATERAL
+from ..growth.rows import FORK, LATERAL, lengths
 from ..growth.seeds import BASE, WIDTH, Branches
 from .flora import Flora
 from .samples import LIMB, STEM, STEM_LIMB, Limbs, Points, Shares
