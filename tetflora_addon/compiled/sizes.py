@@ -38,9 +38,8 @@ from ..growth.seeds import BASE, LEAST, MOST, PLAIN, WIDTH, Branches, Seeds
 from ..leaves.levels import level_errors
 from ..leaves.models import LeafModel
 from ..parallel import each_on_all_cores
-from ..species.growing import faded
 from ..species.members import expected_polygons
-from ..species.species import Species
+from ..species.species import Species, faded
 from .flora import Flora, compile_species
 from .samples import Points
 

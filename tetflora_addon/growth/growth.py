@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays import Arrays, Floats, Integers, Integers32, Keys, Table, by_component, columns, dot, spread
-from ..species.growing import faded
 from ..species.members import dead_vigor
+from ..species.species import faded
 from . import crown_effects
 from .axes import Axes, axes, profile
 from .hashing import Draw, child_key, key_of_seed, signed, uniform

@@ -26,18 +26,23 @@ from numpy.typing import ArrayLike, NDArray
 from ..arrays import Floats, Integers, Keys, Mask, Table, perpendicular
 from ..errors import SpeciesError
 from ..parameters import keys_of
-from ..species.growing import EVEN, NodeLaw, Nodes, faded, shortened, some_nodes
 from ..species.members import expected_forks, least_length, part_segments
 from ..species.skeletons import DrawnBranches, drawn_branches
 from ..species.species import (
+    EVEN,
     LEAF_ENVELOPES,
     LEAF_INCLINATIONS,
     Dead,
+    NodeLaw,
+    Nodes,
     Order,
     Range,
     Species,
     crown_ratio,
+    faded,
     fork_cuts,
+    shortened,
+    some_nodes,
     whole_cuts,
 )
 from .hashing import Draw, child_key, signed
@@ -412,7 +417,7 @@ stems beyond a fork; ``outward`` branches whose own axis leads from the inside o
 sub-plants whose shape depends on how they stand to the sky; ``gradient`` leaves whose size or color differs between
 inside and outside, or old and young; ``sunlit`` leaves that turn to the sky otherwise outside than inside; ``exact``
 plants that are all the same; ``dead`` branches that are broken off or bare. Of axes that are not full-grown ``growing``
-says where children of each sort are (`grown_rows`), ``settled``, ``conical`` and ``ramps`` are those of
+says where children of each sort are, ``settled``, ``conical`` and ``ramps`` are those of
 `species.growing.PartGrown`, and ``least`` is the vigor below which a branch is new, or about to die.
 
 A plant whose form is drawn by hand begins with a ``phantom`` row: a branch without wood, whose children are the

@@ -15,10 +15,9 @@ from ..errors import SpeciesError, quoted
 from ..files import beside, parse_json, read_whole
 from ..leaves.schema import read_forms
 from ..parameters import FileReader, Rgb, keys_of
-from .growing import Ages
 from .members import expected_polygons
 from .skeletons import MAX_ORDERS
-from .species import DAYS, LEAF_KINDS, MAX_AUTUMN, Bud, Dead, Ecology, LeafYear, Order, Species, Year
+from .species import DAYS, LEAF_KINDS, MAX_AUTUMN, Ages, Bud, Dead, Ecology, LeafYear, Order, Species, Year
 
 MAX_FILE_BYTES = 4_000_000
 MAX_POLYGONS = 20_000_000
