@@ -28,10 +28,9 @@ from tetflora_addon.proxies.microsurfaces import Facets
 from tetflora_addon.proxies.primitives import joined
 from tetflora_addon.refinement.contents import bounding_capsules
 from tetflora_addon.refinement.loop import Refinement
-from tetflora_addon.species.catalog import builtin_folder, load_species
+from tetflora_addon.species.catalog import builtin_folder, load_species, species_from_dict
 from tetflora_addon.species.members import expected_polygons
 from tetflora_addon.species.quality import with_quality
-from tetflora_addon.species.schema import species_from_dict
 from tetflora_addon.subplants.leaf_meshes import LeafMesh, leaf_meshes
 from tetflora_addon.subplants.pieces import Pieces, expand, whole_pieces
 from tetflora_addon.subplants.tubes import tube_buffers

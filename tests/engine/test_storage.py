@@ -23,8 +23,7 @@ from tetflora_addon import storage
 from tetflora_addon.compiled.flora import compile_species
 from tetflora_addon.errors import TetFloraError
 from tetflora_addon.proxies import facet_weights
-from tetflora_addon.species.catalog import load_species
-from tetflora_addon.species.schema import species_from_dict
+from tetflora_addon.species.catalog import load_species, species_from_dict
 
 ROOT = Path(__file__).resolve().parents[2]
 TRUTH = np.linspace(0.0, 1.0, 24).reshape(2, 3, 4)

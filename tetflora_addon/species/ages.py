@@ -20,8 +20,8 @@ from typing import Any
 
 import numpy as np
 
+from .catalog import LENGTH_HIGH, ORDER_KEYS
 from .members import expected_leaf_area
-from .schema import LENGTH_HIGH, ORDER_KEYS
 from .skeletons import Skeleton
 from .species import Ages, Color, Dead, NodeLaw, Nodes, Order, PartGrown, Range, Species, rounded_least
 

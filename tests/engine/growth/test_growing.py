@@ -20,7 +20,7 @@ from tetflora_addon.growth.rows import DEAD_ORDER
 from tetflora_addon.growth.seeds import Branches
 from tetflora_addon.refinement.contents import subplant_totals
 from tetflora_addon.species.ages import with_age
-from tetflora_addon.species.schema import species_from_dict
+from tetflora_addon.species.catalog import species_from_dict
 from tetflora_addon.species.species import Ages, NodeLaw, Species
 from tetflora_addon.subplants.pieces import wood_areas
 

@@ -27,7 +27,7 @@ from tetflora_addon.growth.seasons import (
     seasonal_rows,
 )
 from tetflora_addon.growth.wind import Wind
-from tetflora_addon.species.schema import species_from_dict
+from tetflora_addon.species.catalog import species_from_dict
 from tetflora_addon.species.species import DAYS, LeafYear, Species, Year
 from tetflora_addon.subplants.leaf_meshes import leaf_meshes
 from tetflora_addon.subplants.pieces import expand

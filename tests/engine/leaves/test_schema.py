@@ -15,7 +15,7 @@ from tetflora_addon.leaves.levels import leaf_levels
 from tetflora_addon.leaves.models import _PAGES, LEAF_MODELS, LeafModel
 from tetflora_addon.leaves.outlines import Blade
 from tetflora_addon.leaves.surfaces import Needles
-from tetflora_addon.species.schema import species_from_dict
+from tetflora_addon.species.catalog import species_from_dict
 
 
 def leaf(data: Any) -> LeafModel:

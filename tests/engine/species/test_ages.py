@@ -17,9 +17,8 @@ from tetflora_addon.compiled.flora import Flora, compile_species
 from tetflora_addon.errors import SpeciesError
 from tetflora_addon.growth.rows import DEAD_ORDER
 from tetflora_addon.species.ages import STAGES, ages_of, stage, with_age
-from tetflora_addon.species.catalog import load_species
+from tetflora_addon.species.catalog import load_species, species_from_dict
 from tetflora_addon.species.members import expected_members, expected_polygons
-from tetflora_addon.species.schema import species_from_dict
 from tetflora_addon.species.species import grown
 
 TREES = [name for name in support.SPECIES if not ages_of(load_species(name)).scaled]

@@ -17,10 +17,9 @@ from tetflora_addon.emission.plants import expanded_blocks
 from tetflora_addon.growth.growth import trunks
 from tetflora_addon.growth.seasons import Season
 from tetflora_addon.growth.seeds import Seeds
-from tetflora_addon.species.catalog import builtin_folder, load_species
+from tetflora_addon.species.catalog import builtin_folder, load_species, species_from_dict
 from tetflora_addon.species.litter import FALLEN, leaves_page, shed_share
 from tetflora_addon.species.members import expected_polygons
-from tetflora_addon.species.schema import species_from_dict
 
 TREES = ("beech", "oak", "birch", "spruce", "scots_pine", "willow")
 

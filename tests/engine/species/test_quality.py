@@ -18,10 +18,9 @@ from tetflora_addon.compiled.flora import compile_species
 from tetflora_addon.errors import SpeciesError
 from tetflora_addon.growth.axes import axes
 from tetflora_addon.growth.rows import build_rows
-from tetflora_addon.species.catalog import load_species
+from tetflora_addon.species.catalog import ORDER_KEYS, load_species, species_from_dict
 from tetflora_addon.species.members import expected_members, expected_polygons
 from tetflora_addon.species.quality import with_quality
-from tetflora_addon.species.schema import ORDER_KEYS, species_from_dict
 from tetflora_addon.species.species import LEAF_KINDS, QUALITY_LIMITS, Range, Species
 
 KINDS = st.sampled_from(support.SPECIES)

@@ -25,8 +25,14 @@ from tetflora_addon.compiled.orientation import leaf_moments
 from tetflora_addon.errors import SpeciesError
 from tetflora_addon.leaves.models import LEAF_MODELS, MAX_LEAF_POLYGONS, leaf_model
 from tetflora_addon.parameters import keys_of
-from tetflora_addon.species.catalog import list_species, load_species
-from tetflora_addon.species.schema import MAX_FILE_BYTES, ORDER_KEYS, read_species, species_from_dict
+from tetflora_addon.species.catalog import (
+    MAX_FILE_BYTES,
+    ORDER_KEYS,
+    list_species,
+    load_species,
+    read_species,
+    species_from_dict,
+)
 from tetflora_addon.species.skeletons import MAX_ORDERS
 from tetflora_addon.species.species import CROWN_PROFILES, Ages, Bud, Dead, Ecology, LeafYear, Range, Year, crown_ratio
 
