@@ -418,7 +418,7 @@ sub-plants whose shape depends on how they stand to the sky; ``gradient`` leaves
 inside and outside, or old and young; ``sunlit`` leaves that turn to the sky otherwise outside than inside; ``exact``
 plants that are all the same; ``dead`` branches that are broken off or bare. Of axes that are not full-grown ``growing``
 says where children of each sort are, ``settled``, ``conical`` and ``ramps`` are those of
-`species.growing.PartGrown`, and ``least`` is the vigor below which a branch is new, or about to die.
+`species.PartGrown`, and ``least`` is the vigor below which a branch is new, or about to die.
 
 A plant whose form is drawn by hand begins with a ``phantom`` row: a branch without wood, whose children are the
 ``drawn`` rows from the first to before the last of ``drawn_rows``. Each of these is one branch with ``knots`` (meters,

@@ -59,7 +59,7 @@ def with_quality(species: Species, quality: float) -> Species:
     Raises
     ------
     SpeciesError
-        The quality is out of range or not finite, or a plant would have more than `schema.MAX_POLYGONS` polygons.
+        The quality is out of range or not finite, or a plant would have more than `catalog.MAX_POLYGONS` polygons.
 
     Notes
     -----
