@@ -31,9 +31,8 @@ from typing import Self
 import numpy as np
 
 from ..arrays import GOLDEN_TURN, Floats, Floats32, Integers, Mask, Table, spiral, spread
-from ..compiled.clumping import fingerprint
+from ..compiled.clumping import PlantElements, basis, elements_of, fingerprint
 from ..compiled.flora import Flora, compile_species
-from ..compiled.rays import PlantElements, basis, elements_of
 from ..growth.foliage import are_solids
 from ..growth.growth import trunks
 from ..growth.hashing import mix

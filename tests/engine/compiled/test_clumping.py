@@ -14,9 +14,18 @@ from numpy.typing import NDArray
 
 from tests.engine import support
 from tetflora_addon.buffers import MeshBuffers
-from tetflora_addon.compiled.clumping import LEAST, MOST, Clumping, factors
+from tetflora_addon.compiled.clumping import (
+    LEAST,
+    MOST,
+    Clumping,
+    basis,
+    cell_numbers,
+    covered,
+    elements_of,
+    factors,
+    path_lengths,
+)
 from tetflora_addon.compiled.flora import Flora
-from tetflora_addon.compiled.rays import basis, cell_numbers, covered, elements_of, path_lengths
 from tetflora_addon.growth.growth import trunks
 from tetflora_addon.growth.seeds import Seeds
 from tetflora_addon.proxies.summaries import Summaries, extinction_matrices, summarize
