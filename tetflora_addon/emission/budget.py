@@ -28,8 +28,7 @@ import numpy as np
 
 from ..arrays import GOLDEN_ANGLE, GOLDEN_TURN, Floats, Integers, Mask, spread
 from ..camera.camera import Camera
-from ..compiled.flora import Flora
-from ..compiled.placed import extents
+from ..compiled.flora import Flora, extents
 from ..compiled.sizes import LEVEL, Crown, CrownParts
 from ..growth.growth import WholeBranches, leaf_counts, trunks
 from ..growth.seeds import Branches, Seeds

@@ -27,8 +27,7 @@ from ..arrays import Arrays, Floats, Integers, Mask, chunks, column, length
 from ..buffers import BLOCK_POLYGONS, MeshBuffers
 from ..camera.camera import Camera
 from ..compiled.bounds import own_leaf_reaches
-from ..compiled.flora import Flora
-from ..compiled.placed import extents
+from ..compiled.flora import Flora, extents
 from ..growth.axes import Axes, axes
 from ..growth.foliage import envelope_reach
 from ..growth.growth import WholeBranches, trunks

@@ -20,8 +20,7 @@ from numpy.typing import NDArray
 
 from ..arrays import GOLDEN_ANGLE, Arrays, Floats, Integers, Keys, gathered, perpendicular, products, spread, unit
 from ..assets.asset import COUNTS
-from ..compiled.flora import Flora
-from ..compiled.placed import placed_samples
+from ..compiled.flora import Flora, placed_samples
 from ..compiled.samples import Points
 from ..growth.axes import axes
 from ..growth.foliage import leaf_start, outwardness, place_leaves, settled, youth
