@@ -15,10 +15,9 @@ import numpy as np
 
 from ..arrays import Floats, Floats32, Integers, Mask
 from ..optics import needle_color
-from .blades import Compound, blade_surface, compound_surface
 from .models import LeafModel, closed_parts, mean_silhouette, rounded, spined
 from .outlines import Blade, distance_to_links
-from .surfaces import FLAT, SPARSE, LeafSurface, Needles, needle_surface
+from .surfaces import FLAT, SPARSE, Compound, LeafSurface, Needles, blade_surface, compound_surface, needle_surface
 
 #: Tolerances of levels, in lengths of the leaf.
 TOLERANCES = (0.03, 0.012, 0.004, 0.0015, 0.0005, 0.0002)

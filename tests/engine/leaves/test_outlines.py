@@ -11,9 +11,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tetflora_addon.leaves.blades import blade_surface, crossings, outline
 from tetflora_addon.leaves.models import LEAF_MODELS
 from tetflora_addon.leaves.outlines import Blade, distance_to_links, simplified, traced
+from tetflora_addon.leaves.surfaces import blade_surface, crossings, outline
 from tetflora_addon.parameters import keys_of
 
 BLADES = {name: model.shape for name, model in LEAF_MODELS.items() if isinstance(model.shape, Blade)}
