@@ -23,8 +23,7 @@ from tetflora_addon.growth.growth import trunks
 from tetflora_addon.growth.seasons import Season
 from tetflora_addon.growth.seeds import crown_shapes
 from tetflora_addon.growth.wind import Wind
-from tetflora_addon.leaves.kites import leaf_kites
-from tetflora_addon.leaves.levels import leaf_levels
+from tetflora_addon.leaves.levels import leaf_kites, leaf_levels
 from tetflora_addon.leaves.models import LEAF_MODELS
 from tetflora_addon.refinement.contents import bounding_capsules, subplant_totals
 from tetflora_addon.species.ages import with_age

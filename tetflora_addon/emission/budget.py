@@ -32,8 +32,7 @@ from ..compiled.flora import Flora, extents
 from ..compiled.sizes import LEVEL, Crown, CrownParts
 from ..growth.growth import WholeBranches, leaf_counts, trunks
 from ..growth.seeds import Branches, Seeds
-from ..leaves.kites import leaf_planes
-from ..leaves.levels import chosen_polygons
+from ..leaves.levels import chosen_polygons, leaf_planes
 from ..refinement.decisions import Decision, contributions, explicit_fraction
 from ..refinement.loop import Refinement
 from ..refinement.settings import RefinementSettings

@@ -33,8 +33,7 @@ from ..growth.foliage import envelope_reach
 from ..growth.growth import WholeBranches, trunks
 from ..growth.hashing import Draw, uniform
 from ..growth.seeds import Branches, Seeds
-from ..leaves.kites import leaf_kites
-from ..leaves.levels import coarse_error
+from ..leaves.levels import coarse_error, leaf_kites
 from ..leaves.models import LeafModel
 from ..processes.pool import WORTH_PROCESSES, in_processes
 from ..proxies.facet_weights import FacetWeights, leaf_shares

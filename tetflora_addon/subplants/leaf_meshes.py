@@ -34,8 +34,7 @@ from ..growth.hashing import Draw, uniform
 from ..growth.seasons import is_seasonal, leaf_colors
 from ..growth.seeds import Branches
 from ..growth.wind import moment
-from ..leaves.kites import KITE, LeafKites, leaf_kites, leaf_planes
-from ..leaves.levels import LeafLevel, chosen_level, hidden_gloss, leaf_levels
+from ..leaves.levels import KITE, LeafKites, LeafLevel, chosen_level, hidden_gloss, leaf_kites, leaf_levels, leaf_planes
 from ..leaves.models import LeafModel
 from .pieces import Thin
 

@@ -12,8 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tetflora_addon.growth.foliage import face_light
-from tetflora_addon.leaves.kites import leaf_kites
-from tetflora_addon.leaves.levels import leaf_levels
+from tetflora_addon.leaves.levels import leaf_kites, leaf_levels
 from tetflora_addon.leaves.models import LEAF_MODELS
 from tetflora_addon.subplants.leaf_meshes import KiteCopies, LeafCopies, LevelCopies
 
