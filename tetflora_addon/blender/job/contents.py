@@ -21,10 +21,9 @@ from ...growth.wind import Wind
 from ...light.illumination import Sources
 from ...processes import pool
 from ...refinement.lights import Light
-from ...refinement.loop import Outliers
+from ...refinement.loop import Outliers, Statistics
 from ...refinement.polygons import Polygons
 from ...refinement.settings import RefinementSettings
-from ...refinement.statistics import Statistics
 from ...species.catalog import list_species, load_species
 from ...species.kinds import Kind
 from ...species.species import Species

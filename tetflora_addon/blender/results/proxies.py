@@ -14,7 +14,7 @@ from ...emission.asset_plan import ASSETS
 from ...emission.emitters import Buffers, EmissionInput
 from ...jobs import Job, Progress
 from ...light.illumination import BATCH, BakedLight, SheetList, Sources, at_vertices, baked_attributes, baked_light
-from ...refinement.statistics import Statistics
+from ...refinement.loop import Statistics
 from ..attributes import face_offsets, read, write
 from ..materials.nodes import find_socket, is_ours
 from ..worker import calling, in_thread, written
