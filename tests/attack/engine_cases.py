@@ -19,7 +19,7 @@ from tests.attack import material
 from tests.attack.watch import Case, Jail
 from tests.engine import support
 from tetflora_addon import files, storage
-from tetflora_addon.assets.mesh_features import mesh_features
+from tetflora_addon.assets.patches import mesh_features
 from tetflora_addon.compiled.flora import compile_species
 from tetflora_addon.emission.polygons import kept_polygons, polygon_blocks
 from tetflora_addon.errors import TetFloraError

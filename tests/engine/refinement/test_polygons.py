@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 from tests.engine import support
 from tests.engine.subplants.test_leaf_meshes import check_topology
-from tetflora_addon.assets.mesh_features import mesh_features
+from tetflora_addon.assets.patches import mesh_features
 from tetflora_addon.buffers import MeshBuffers
 from tetflora_addon.emission.budget import fit_to_budget
 from tetflora_addon.emission.polygons import PolygonBlock, kept_polygons, mended, polygon_blocks, polygon_buffers
