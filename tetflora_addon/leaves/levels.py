@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Levels of a leaf beside its model, which is that of its species: finer forms for those that are near, and one kite for
-those of a pixel or two.
+"""Levels of a leaf beside its model, which is that of its species: finer forms for those that are near, and one kite
+for those of a pixel or two.
 
 Each finer level has the same area, and knows how far it is from the shape it stands for, in lengths of the leaf; it is
 drawn where the one before it would be off by more than a part of a pixel.

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The main loop: visibility, refinement, update, until the image gains nothing more (paper, section 6.2); its statistics.
+"""The main loop: visibility, refinement, update, until the image gains nothing more (paper, section 6.2); and statistics.
 
 A pass costs what it changes: only divided tetrahedra give their contents away, only new ones are drawn and summed up.
 

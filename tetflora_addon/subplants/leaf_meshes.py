@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Leaves as polygons: copies of the species' leaf models, written straight into the arrays of their mesh.
 
-See section 5 of the paper. What is small in the image may be a kite, see `leaves.kites`; what is large
+See section 5 of the paper. What is small in the image may be a kite, see `leaves.levels`; what is large
 has finer levels, see `leaves.levels`.
 
 Meshes of copies of a leaf model, written straight into the arrays of the mesh.
