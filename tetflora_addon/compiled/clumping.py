@@ -265,7 +265,6 @@ def elements_of(
 
     Parameters
     ----------
-    rows : parameter table
     forms : by kind
         Models of leaves of the species.
     subplants : Branches of one species

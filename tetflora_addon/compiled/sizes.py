@@ -256,7 +256,6 @@ def fitted(flora: Flora, seeds: Seeds, height: Floats, width: Floats, times: int
 
     Parameters
     ----------
-    flora : Flora
     seeds : Seeds of n
     height, width : (n,) float64
         Meters.

@@ -210,7 +210,6 @@ def chosen_children(
 
     Parameters
     ----------
-    rows : parameter table
     parents : Branches of n
     lines : Axes of the same n
     owner : (m,) int

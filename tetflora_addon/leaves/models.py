@@ -302,7 +302,6 @@ def rounded(model: LeafModel, times: int) -> tuple[LeafModel, float]:
 
     Parameters
     ----------
-    model : LeafModel
     times : int
         Each makes four faces of a triangle.
 
@@ -424,8 +423,6 @@ def spined(model: LeafModel, spines: Spines, part: Integers) -> tuple[LeafModel,
 
     Parameters
     ----------
-    model : LeafModel
-    spines : Spines
     part : (f,) int64
         Its `bodies.closed_parts`, on which spines stand.
 

@@ -122,7 +122,6 @@ class SharedParts(Generic[Parts]):
 
     Parameters
     ----------
-    camera : Camera
     filled : bool
         Whether proxies fill their tetrahedra, so that small ones without points would be holes.
     """
@@ -181,7 +180,6 @@ class SharedParts(Generic[Parts]):
 
         Parameters
         ----------
-        tree : TetrahedralTree
         dividing : (nodes,) bool
             Nodes that have been divided.
         edge : (nodes,) float64
@@ -285,7 +283,6 @@ def share_points(
 
     Parameters
     ----------
-    flora : Flora
     parts : PlantParts of n
         Sub-plants, or if ``lines`` are given branches alone.
     pixels : (n,) float64

@@ -302,7 +302,6 @@ def load_species(
 
     Parameters
     ----------
-    identifier : str
     folders : sequence of Path
         As of `list_species`.
     known : mapping, optional

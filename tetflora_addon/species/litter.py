@@ -78,7 +78,6 @@ def litter_page(species: Species, page: Mapping[str, Any]) -> dict[str, Any] | N
 
     Parameters
     ----------
-    species : Species
     page : mapping
         What its species file holds.
     """
@@ -246,7 +245,6 @@ def leaves_page(species: Species, page: Mapping[str, Any]) -> dict[str, Any] | N
 
     Parameters
     ----------
-    species : Species
     page : mapping
         What its species file holds.
     """
