@@ -62,10 +62,7 @@ def part_of(
 class Pace:
     """How long a job works between two redraws: a window that takes long to draw is drawn less often.
 
-    Parameters
-    ----------
-    least : float
-        Seconds of work where drawing takes no time.
+    Where drawing takes no time, these are the least seconds of work.
     """
 
     def __init__(self, least: float) -> None:

@@ -36,20 +36,7 @@ _Feature = dict[str, Any]
 
 
 def read_features(path: Path, chosen: int = 0) -> tuple[list[_Feature], System]:
-    """Features of a file, of which each is an object with a geometry, and their system.
-
-    Parameters
-    ----------
-    chosen : int
-        As of `chosen_system`.
-
-    Raises
-    ------
-    OSError
-        It cannot be read.
-    SceneError
-        It is broken; names the feature.
-    """
+    """Features of a file, of which each is an object with a geometry, and their system, see `chosen_system`."""
     name = path.name
     if path.suffix.lower() in (".shp", ".gpkg"):
         try:
@@ -91,13 +78,7 @@ def read_features(path: Path, chosen: int = 0) -> tuple[list[_Feature], System]:
 
 
 def parts_of(geometry: _Feature | None, where: str) -> Iterator[tuple[str, Any]]:
-    """Points, lines and areas of a geometry: type and coordinates of each, as GeoJSON has them.
-
-    Raises
-    ------
-    SceneError
-        It is no geometry of GeoJSON; ``where`` begins the message.
-    """
+    """Points, lines and areas of a geometry: type and coordinates of each, as GeoJSON has them."""
     kind = geometry["type"] if geometry else "Point"
     parts = [geometry] if geometry else []
     if kind == "GeometryCollection":
@@ -115,13 +96,7 @@ def parts_of(geometry: _Feature | None, where: str) -> Iterator[tuple[str, Any]]
 
 
 def list_of(value: Any, where: str) -> list[Any]:
-    """Coordinates that are a list.
-
-    Raises
-    ------
-    SceneError
-        They are none; ``where`` begins the message.
-    """
+    """Coordinates that are a list."""
     if not isinstance(value, list):
         raise SceneError(f"{where}: its coordinates are {quoted(value)}, not a list; correct them")
     return value
