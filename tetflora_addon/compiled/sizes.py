@@ -118,10 +118,7 @@ def known_crown(species: Species) -> Crown | None:
 def crown_of(species: Species) -> Crown:
     """The mean crown of a species; its samples are drawn at the first time, which takes some tenths of a second.
 
-    Raises
-    ------
-    SpeciesError
-        A leaf is still the name of a Blender object.
+    A leaf that is still the name of a Blender object is a `SpeciesError`.
     """
     found = _known.get(species)
     if found is None:
@@ -235,12 +232,9 @@ _reaches: "WeakKeyDictionary[Flora, dict[int, TwigReach]]" = WeakKeyDictionary()
 
 
 def measured(flora: Flora, seeds: Seeds) -> tuple[Floats, Floats]:
-    """Heights of plants, to the highest leaf or wood, and means of the extents of their crowns to east and north.
+    """Heights of plants, to the highest leaf or wood, and means of the extents of their crowns to east and north, (n,).
 
-    Returns
-    -------
-    height, width : (n,) float64
-        Meters, about as plants are when all of them has grown.
+    Meters, about as plants are when all of them has grown.
     """
     height, width = np.zeros((2, len(seeds)))
 
@@ -252,21 +246,10 @@ def measured(flora: Flora, seeds: Seeds) -> tuple[Floats, Floats]:
 
 
 def fitted(flora: Flora, seeds: Seeds, height: Floats, width: Floats, times: int = 4) -> Floats:
-    """Factors that give plants the heights and crown widths that were measured.
+    """Factors (n, 2) that give plants the heights and crown widths (n,) that were measured, in meters.
 
-    Parameters
-    ----------
-    seeds : Seeds of n
-    height, width : (n,) float64
-        Meters.
-    times : int
-        How often plants are measured at most.
-
-    Returns
-    -------
-    (n, 2) float64
-        Factors on the scale, and on the lengths of limbs (the first column of crown shapes), which stay within their
-        limits; heights are met even then.
+    They are on the scale, and on the lengths of limbs (the first column of crown shapes), and stay within their limits;
+    heights are met even then. Plants are measured so many times at most.
     """
     out = np.ones((len(seeds), 2))
 

@@ -47,10 +47,7 @@ it is in summer; and the parts of the last that have the fresh color, those of a
 class Season:
     """A day of the year at a place. Fields with a label are properties of a scene, and documented by their tooltips.
 
-    Raises
-    ------
-    TetFloraError
-        A number that is none or is out of its limits.
+    A number that is none or is out of its limits is a `TetFloraError`.
     """
 
     day: float = setting(
@@ -157,11 +154,7 @@ def _numbers(leaf: LeafYear) -> np.void:
 def plant_years(rows: Table, row: Integers, key: Keys) -> Floats | None:
     """The day that it is for plants (n, 2), and where they stand among autumn colors, 0 to 1; None without seasons.
 
-    Parameters
-    ----------
-    row : (n,) int
-        Of their trunks.
-    key : (n,) uint64
+    Rows (n,) are of their trunks.
     """
     if not is_seasonal(rows):
         return None
