@@ -11,9 +11,9 @@ import pytest
 from tests.attack import engine_cases
 from tests.attack.watch import attack
 
-CASES = 2400
+CASES = 1200
 #: Of kinds whose cases take longest.
-FEWER = {"species": 400, "polygons": 400, "cache": 1200}
+FEWER = {"species": 200, "polygons": 200, "cache": 600}
 
 
 @pytest.mark.parametrize("kind", engine_cases.SHARES)

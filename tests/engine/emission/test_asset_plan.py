@@ -117,8 +117,7 @@ def area(*facets: Facets) -> float:
     return float(sum((own.side**2).sum() for own in facets))
 
 
-@pytest.mark.parametrize("limit", [0.2, 1.0, 4.0])
-@pytest.mark.parametrize("fraction", [0.3, NEVER])
+@pytest.mark.parametrize(("limit", "fraction"), [(0.2, 0.3), (1.0, NEVER), (4.0, 0.3)])
 def test_every_part_is_drawn_once(limit: float, fraction: float, monkeypatch: pytest.MonkeyPatch) -> None:
     """All of the area is there, as what it is or as facets; what nobody sees may be less."""
     monkeypatch.setattr(microsurfaces, "asset_weights", lambda _placed, parts, _number: np.ones(len(parts)))
@@ -134,7 +133,7 @@ def test_every_part_is_drawn_once(limit: float, fraction: float, monkeypatch: py
     # Of hidden ones a few are drawn by chance for many, up to 64 times as large: the mean of several draws is meant.
     found = [optical(placed, plan) + area(seen, unseen)]
     monkeypatch.setenv("TETFLORA_THREADS", "1")  # other processes know nothing of the draws
-    for draw in range(5):
+    for draw in range(3):
         monkeypatch.setattr(drawing, "_MERGE", 300 + draw)
         plan, seen, unseen = drawn(result, camera, limit, originals(fraction))
         found.append(optical(placed, plan) + area(seen, unseen))

@@ -138,7 +138,7 @@ def test_numbers_of_children_are_as_expected(years: float, sort: int) -> None:
 
 
 @given(years=st.floats(0.2, 200), seed=st.integers(0, 1000))
-@settings(deadline=None, max_examples=8)
+@settings(deadline=None, max_examples=4)
 def test_every_vertex_is_inside_the_bound(years: float, seed: int) -> None:
     flora = at_age(rich(), years)
     trunk = support.trunks(flora.rows, support.plants(np.arange(seed, seed + 2)))
