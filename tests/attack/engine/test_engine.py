@@ -11,7 +11,7 @@ import pytest
 from tests.attack import engine_cases
 from tests.attack.watch import attack
 
-CASES = 1200
+CASES = 2400
 #: Of kinds whose cases take longest.
 FEWER = {"species": 200, "polygons": 200, "cache": 600}
 

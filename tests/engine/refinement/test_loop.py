@@ -313,7 +313,7 @@ def test_the_order_of_plants_does_not_matter(seed: int) -> None:
 @pytest.mark.parametrize("view", [((0, -22, 2), (0, 0, 4)), ((1, 1, 1.7), (9, 9, 4))], ids=("edge", "within"))
 def test_what_is_hidden_is_not_opened_more_than_what_is_seen(species: str, view: tuple) -> None:
     """In a small wood, hidden tetrahedra hold no more of the parts that plants have been opened into than seen ones."""
-    flora = support.alone(species)
+    flora = support.alone(species, 50_000.0)
     _, result = run(flora, support.grove(49, 4.0), support.camera(*view, pixels=480, view=1.0))
     subplants, bodies = result.plants.held_apart(len(result.tree))
     of_opened = subplants.cell[subplants.items.row != flora.first_row[0]]
