@@ -45,7 +45,7 @@ def samples_of_plants(species: int, count: int) -> dict[str, np.ndarray]:
 def test_averages_are_those_of_grown_plants(species: int) -> None:
     """Within four standard errors; the wood as a ratio, for it depends on the trunk's size."""
     flora = support.lean()
-    found = samples_of_plants(species, min(120, int(5e5 / flora.polygons[flora.first_row[species]])))
+    found = samples_of_plants(species, min(60, int(2e5 / flora.polygons[flora.first_row[species]])))
     row = flora.first_row[species]
     for name in ("leaf_count", "leaf_area", "polygons"):
         expected, values = flora.area_nodes[row, 0] if name == "leaf_area" else getattr(flora, name)[row], found[name]
