@@ -57,9 +57,9 @@ _TABLE = {
     "emission": ". processes leaves species growth compiled subplants tetrahedra camera refinement proxies light",
     "export": ". species growth compiled subplants",
     "blender": ". processes growth camera refinement",
-    "blender/materials": ". growth light emission blender",
+    "blender/materials": ". growth light blender",
     "blender/species": ". leaves species blender",
-    "blender/scene": ". species growth assets compiled camera refinement planting light emission "
+    "blender/scene": ". species growth assets compiled camera refinement planting light "
     "blender blender/materials blender/species",
     "blender/assets": f". growth assets {_LOW}",
     "blender/results": f". leaves species refinement light emission {_LOW}",
