@@ -280,10 +280,16 @@ class FileReader:
         where: str,
         readers: Mapping[str, Callable[[Any, str], Any]] | None = None,
     ) -> Declared:
-        """An object of a dataclass from what `json.load` gave: fields that have keys, and those that have a reader of
-        their own.
+        """An object of a dataclass: fields that have keys, and those that have a reader of their own.
 
-        For each other key, a reader makes the value of the field of this name from the data and the key's whole name.
+        Parameters
+        ----------
+        data : object
+            What `json.load` gave.
+        where : str
+            Named in errors.
+        readers : mapping, optional
+            For each other key, what makes the value of the field of this name from the data and the key's whole name.
         """
         readers = readers or {}
         self.keys(data, where, (*keys_of(kind), *readers))

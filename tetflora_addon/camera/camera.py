@@ -131,10 +131,14 @@ class Camera:
         return np.max([distance / np.hypot(1.0, slope) for distance, slope in walls], axis=0)
 
     def widened(self, margin: float, margin_up: float | None = None) -> Self:
-        """The same camera with more around its image: fractions of its width left and right, of its height below and
-        above.
+        """The same camera with more around its image.
 
-        The second is as the first if it is not given.
+        Parameters
+        ----------
+        margin : float
+            Fraction of the image's width that is added on the left and on the right.
+        margin_up : float, optional
+            Fraction of its height that is added below and above; as ``margin`` if it is not given.
         """
         left, right, bottom, top = self.window
         # Whole pixels, so that the pixels of the image stay where they are.
@@ -250,9 +254,21 @@ def to_eye(camera: Camera, points: Floats) -> Floats:
 
 
 def blur_margins(camera: Camera, center: Floats, reach: Floats) -> tuple[float, float]:
-    """Fractions of the image's width and height, 0 to `MOST`, by which blur of lens and shutter reaches beyond it.
+    """Fractions of the image's width and height by which blur reaches beyond it.
 
-    Spheres around middles (n, 3) with radii (n,) hold the plants, meters. Where nothing is blurred, 0.
+    Parameters
+    ----------
+    camera : Camera
+        With its lens and shutter.
+    center : (n, 3) float64
+        Middles of the plants, meters, world space.
+    reach : (n,) float64
+        Radii of spheres around them that hold the plants, meters.
+
+    Returns
+    -------
+    across, up : float
+        For each side of the image, 0 to `MOST`. Where nothing is blurred, 0.
     """
     if not len(center) or not (camera.lens_radius > 0.0 or camera.shutter):
         return 0.0, 0.0
@@ -310,10 +326,21 @@ def _movement(camera: Camera, other: Camera, depths: tuple[float, float]) -> Flo
 
 
 def silhouette_pixels(vertices: Floats, camera: Camera) -> tuple[Floats, Mask]:
-    """Exact silhouette areas (n,) of tetrahedra (n, 4, 3) on the final image, pixels, and where they are known (n,).
+    """Exact silhouette areas of tetrahedra on the final image.
 
-    That is of what is beyond the near plane. Known are tetrahedra within the window that are not beyond the far plane,
-    as all of the view are; of others it is 0.
+    Parameters
+    ----------
+    vertices : (n, 4, 3) float64
+        World space, meters.
+    camera : Camera
+        Its ``width`` and ``height`` are the image's.
+
+    Returns
+    -------
+    pixels : (n,) float64
+        Area in pixels of what is beyond the near plane; 0 where it is not known.
+    whole : (n,) bool
+        Where it is known: tetrahedra within the window that are not beyond the far plane, as all of the view are.
     """
     local = camera.to_camera_space(vertices)
     low, high, _ = window_bounds(local, camera)
@@ -323,12 +350,19 @@ def silhouette_pixels(vertices: Floats, camera: Camera) -> tuple[Floats, Mask]:
 
 
 def expected_pixels(vertices: Floats, camera: Camera) -> tuple[Floats, Mask]:
-    """Silhouette areas (n,) of tetrahedra on the final image, also of those partly in view; and which are whole in view
-    (n,).
+    """Silhouette areas of tetrahedra on the final image, also of those that are partly in view.
 
-    As of `silhouette_pixels`; the camera may be panoramic. Of those that are partly in view half the pixels of the seen
-    part of the box around them, which a tetrahedron hardly ever exceeds; 0 out of view. On a panorama from the area
-    across the line of sight.
+    Parameters
+    ----------
+    vertices, camera
+        As for `silhouette_pixels`; the camera may be panoramic.
+
+    Returns
+    -------
+    pixels : (n,) float64
+        Exact for those that are whole in view. Of others half the pixels of the seen part of the box around them, which
+        a tetrahedron hardly ever exceeds; 0 out of view. On a panorama from the area across the line of sight.
+    whole : (n,) bool
     """
     if camera.kind == "PANO":
         return _on_the_sphere(vertices, camera)

@@ -107,11 +107,18 @@ class _Turns:
 def cell_camera(camera: Camera, cells: ViewCells, around: Around | None = None) -> Camera | None:
     """The camera that stands for all that are in the same cell as a camera: the same numbers for each of them.
 
-    The shutter and other eyes of a camera, as it was read, without margins, should stay in the cell or next to it, see
-    `BEYOND`. Cells far from all things are larger where it is known what is around; else they are the same everywhere.
+    Parameters
+    ----------
+    camera : Camera
+        As it was read, without margins. Its shutter and other eyes should stay in the cell or next to it, see `BEYOND`.
+    around : Around, optional
+        Where things are; cells far from all of them are larger. None for the same cells everywhere.
 
-    None where a camera cannot share its refinement: it moves out of its cell while the shutter is open, its view is
-    wider than any window, or it is a panorama of less than the whole sphere.
+    Returns
+    -------
+    Camera or None
+        None where a camera cannot share its refinement: it moves out of its cell while the shutter is open, its view is
+        wider than any window, or it is a panorama of less than the whole sphere.
     """
     left, right, bottom, top = camera.window
     whole = right - left > 2.0 * np.pi - 1e-3 and top - bottom > np.pi - 1e-3

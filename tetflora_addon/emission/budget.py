@@ -92,8 +92,12 @@ def fit_to_budget(
 ) -> Detail:
     """Detail that fits into the budget of the settings.
 
-    Where proxies have so many faces each they are tetrahedra; by default facets or spheres, whose number follows their
-    size.
+    Parameters
+    ----------
+    result : Refinement
+        Of the loop.
+    faces : float, optional
+        Faces of each proxy tetrahedron; by default proxies are facets or spheres, whose number follows their size.
     """
     memory = settings.max_memory * 1e9 / BYTES_PER_POLYGON if settings.max_memory else np.inf
     most = (1.0 - RESERVE) * min(memory, settings.max_polygons or np.inf)
@@ -118,10 +122,16 @@ def fit_to_budget(
 
 
 def relative_side(number: float, facet: float) -> float:
-    """Side of facets over that in pixels which is asked for, with which there would be so many polygons and facets.
+    """Side of facets over that which is asked for, where there would be so many primitives: 1, or less if few.
 
-    It is 1, or less if these are few. What is asked to be coarser than *Final* is so in small images as well: they
-    would take as long otherwise.
+    What is asked to be coarser than *Final* is so in small images as well: they would take as long otherwise.
+
+    Parameters
+    ----------
+    number : float
+        Polygons and facets with the side that is asked for.
+    facet : float
+        That side, pixels.
     """
     few = PLENTY / max(facet / RefinementSettings().facet, 1.0) ** 2
     return float(np.clip(np.sqrt(number / few), 1.0 / FINEST, 1.0))
@@ -465,7 +475,10 @@ def coarse_faces(flora: Flora, seeds: Seeds) -> Floats:
 def expanded_faces(flora: Flora, seeds: Seeds, camera: Camera) -> Iterator[Floats]:
     """Expected polygons (2,) of all plants as `expanded_blocks` makes them for a camera, and triangles.
 
-    Numbers are more with each item, of which the last ones count; who waits for a limit may stop before.
+    Yields
+    ------
+    (2,) float64
+        Numbers that are more with each item, of which the last ones count; who waits for a limit may stop before.
     """
     plants, total = trunks(flora.rows, seeds), coarse_faces(flora, seeds)
     yield total

@@ -293,9 +293,16 @@ _DOWN = np.array([0.0, 0.0, -1.0])
 
 
 class Shade:
-    """Optical depth between a place and the strongest light, of several the brightest sun; without any, the sky above.
+    """Optical depth between a place and the strongest light.
 
-    Places (m, 3) stand for one-sided areas (m,) of sheets, m².
+    Parameters
+    ----------
+    position : (m, 3) float
+        Places that stand for areas (m,), meters.
+    area : (m,) float
+        One-sided area of sheets, m².
+    lights : sequence of Light
+        Of several the brightest sun counts; without any, the sky above.
     """
 
     def __init__(self, position: NDArray[np.floating], area: NDArray[np.floating], lights: Sequence[Light]) -> None:

@@ -91,17 +91,19 @@ def shell_buffers(
     rank: ArrayLike | None = None,
     light: ArrayLike | None = None,
 ) -> MeshBuffers:
-    """One mesh of proxy tetrahedra (n, 4, 3) in either orientation, meters, with the attributes of the shell material
-    (paper, 7).
+    """One mesh of all proxy tetrahedra, with the attributes of the shell material (paper, section 7).
 
     Names and units of the attributes are in ``docs/architecture.md``. Each cell has vertices of its own: barycentric
-    coordinates differ from cell to cell at a shared corner; its four triangles face outwards. Flat cells get no
-    extinction, because their thickness has no meaning.
+    coordinates differ from cell to cell at a shared corner.
 
     Parameters
     ----------
-    color, transmission : (n, 3), (n,) float
-        Means of the contents: linear color, and the fraction of the scattered light that passes through the sheets.
+    vertices : (n, 4, 3) float
+        Corners of the cells in either orientation, meters, world space.
+    color : (n, 3) float
+        Mean color of the contents, linear.
+    transmission : (n,) float
+        Fraction of the scattered light that passes through the sheets, 0 to 1.
     S : (n, 6) float
         (Sxx, Syy, Szz, Sxy, Sxz, Syz) with κ(ω) = √(ωᵀSω), 1/m².
     normal : (n, 3) float
@@ -109,10 +111,17 @@ def shell_buffers(
     plane : (n,) float
         Weight of the plane term against the particle term, 0 to 1.
     rank : (n,) number, optional
-        Place of each cell front to back. Cells are then written back to front: EEVEE blends the faces of a mesh in
-        their order. Without it cells keep theirs.
+        Place of each cell front to back as the camera sees them, in any unit. Cells are then written back to front:
+        EEVEE blends the faces of a mesh in their order. Without it cells keep theirs.
     light : (n, 4, 3) float, optional
-        Radiance that the contents scatter toward the camera at each corner, albedo and phase included, W/(m² sr).
+        Radiance that the contents scatter toward the camera at each corner, albedo and phase included, W/(m² sr);
+        becomes ``tf_light0`` to ``tf_light3`` for the material of baked light.
+
+    Returns
+    -------
+    MeshBuffers
+        Four triangles, four vertices and six edges a cell, facing outwards. Flat cells get no extinction, because
+        their thickness has no meaning.
 
     Raises
     ------

@@ -37,19 +37,23 @@ class _Taps:
 
 
 class LightBuffer:
-    """Tetrahedra and polygons in the order in which light meets them, in a flat view from the light.
+    """Tetrahedra and polygons in the order in which light meets them.
 
     Parameters
     ----------
+    camera : Camera
+        Flat view from the light.
     resolution : int
         Longer side of the buffer, pixels.
-    vertices, extinction : (n, 4, 3), (n,) float64
-        Positively oriented tetrahedra that do not overlap, meters; κ ≥ 0 along the light, 1/m.
+    vertices : (n, 4, 3) float64
+        Positively oriented tetrahedra that do not overlap, meters.
+    extinction : (n,) float64
+        κ ≥ 0 along the light, 1/m.
     occluders : (t, 3, 3) float64, optional
         Opaque triangles, meters.
     sheets : (m, 4, 3) float64, optional
-        Corners of opaque facets or leaves, which count by the fraction of each pixel that they cover. Their numbers are
-        n to n + m − 1, after the tetrahedra.
+        Corners of opaque facets or leaves, which count by the fraction of each pixel that they cover. Their numbers
+        are n to n + m − 1, after the tetrahedra.
     """
 
     def __init__(
@@ -171,11 +175,24 @@ class LightBuffer:
         return sum(value.nbytes for value in vars(self).values() if isinstance(value, np.ndarray))
 
     def transmittance(self, points: Floats, cells: Integers, own_depth: Floats) -> tuple[Floats, Mask]:
-        """Fraction (m,) of the light that reaches points (m, 3), and whether each is in view (m,); out of view it is 1.
+        """Fraction of the light that reaches points.
 
-        ``cells`` (m,) are the tetrahedra that hold them, or sheets on which they lie, −1 where there is none;
-        ``own_depth`` (m,) the optical depth of that tetrahedron between where light enters it and the point. However
-        coarse the pixels, no tetrahedron darkens itself by more, and no point is darkened by less.
+        Parameters
+        ----------
+        points : (m, 3) float64
+            Meters, world space.
+        cells : (m,) int
+            Tetrahedron that holds each or sheet on which it lies, −1 where there is none.
+        own_depth : (m,) float64
+            Optical depth of that tetrahedron between where light enters it and the point. However coarse the pixels,
+            no tetrahedron darkens itself by more, and no point is darkened by less.
+
+        Returns
+        -------
+        transmittance : (m,) float64
+            0 to 1; 1 where the point is out of view.
+        seen : (m,) bool
+            Whether the point is in view.
         """
         result, seen = np.ones(len(points)), np.zeros(len(points), bool)
         for start in range(0, len(points), POINT_BATCH):

@@ -83,11 +83,23 @@ class Illumination:
     def direct(
         self, points: Floats, cells: Integers, sheets: Integers | None = None
     ) -> Iterator[tuple[Floats, Floats]]:
-        """Light of each lamp at points (m, 3): unit vectors (m, 3) to it, and W/m² (m, 3) that arrive on a surface
-        facing it.
+        """Light of each lamp at points.
 
-        Shadows are included. ``cells`` (m,) are the tetrahedra (index into the clouds) that hold points, −1 for none;
-        ``sheets`` (m,) those on which they lie, which do not shadow them.
+        Parameters
+        ----------
+        points : (m, 3) float64
+            Meters.
+        cells : (m,) int
+            Tetrahedron (index into the clouds) that holds each, −1 for none.
+        sheets : (m,) int, optional
+            Sheet (index) on which each lies, which does not shadow it.
+
+        Yields
+        ------
+        toward : (m, 3) float64
+            Unit vectors to the lamp.
+        irradiance : (m, 3) float64
+            W/m² that arrive on a surface that faces it, shadows included.
         """
         for lit in self.lamps:
             toward, light = arriving(lit.light, points)
@@ -130,18 +142,29 @@ class Illumination:
         sheets: Integers | None = None,
         dull: Floats | None = None,
     ) -> tuple[Floats32, Floats32]:
-        """Outgoing radiance (m, 3) of the fronts and of the backs of facets or leaves, linear RGB, as a pixel shows it.
+        """Outgoing radiance of facets or leaves.
 
         Parameters
         ----------
         center, normal : (m, 3) float64
             Meters; unit vectors that point to the front.
-        color, transmission : (m, 3), (m,) float64
-            Linear RGB; fraction of the scattered light that passes through, 0 for bark.
-        cells, sheets : (m,) int
+        color : (m, 3) float64
+            Linear RGB.
+        transmission : (m,) float64
+            Fraction of the scattered light that passes through; 0 for bark.
+        cells : (m,) int
+            As for `direct`.
+        camera : Camera
+            For the gloss.
+        sheets : (m,) int, optional
             As for `direct`.
         dull : (m,) float64, optional
-            Part of the gloss for the camera that is lost.
+            Part of the gloss that is lost.
+
+        Returns
+        -------
+        front, back : (m, 3) float32
+            Linear RGB, as a pixel shows it.
         """
         front, back = np.zeros((2, len(center), 3), np.float32)
         for start in range(0, len(center), _BATCH):
@@ -169,8 +192,14 @@ class Illumination:
     ) -> Floats32:
         """Radiance (m, 3) of microspheres or, the same, of thick clouds around points, as the camera sees them.
 
-        ``normal`` (m, 3) is the axis of the plane term, whose ways are alike, and ``plane`` (m,) its weight; all else
-        is as for `facet_radiance`.
+        Parameters
+        ----------
+        points, color, transmission, cells
+            As for `facet_radiance`.
+        normal : (m, 3) float64
+            Axis of the plane term; both ways are alike.
+        plane : (m,) float64
+            Weight of the plane term.
         """
         result = np.zeros((len(points), 3), np.float32)
         for start in range(0, len(points), _BATCH):

@@ -170,10 +170,16 @@ class SurfaceElements:
         return SurfaceElements(grown, self.cell[order], self.replaced), number
 
     def samples(self, clouds: MediumCells) -> "tuple[Floats, Integers, Integers, KeyMeans]":
-        """Points (k, 3) where light from all sides is sampled, with cells and sheets (k,) as for `Illumination.direct`.
+        """Where light from all sides is sampled.
 
-        They are the key points of each tetrahedron without sheets, and the middles of some sheets of each other one;
-        and which key point each counts for.
+        Returns
+        -------
+        points : (k, 3) float64
+            The key points of each tetrahedron without sheets, and the middles of some sheets of each other one.
+        cells, sheets : (k,) int64
+            As for `Illumination.direct`.
+        keys : KeyMeans
+            Which key point each counts for.
         """
         key = np.arange(4 * len(clouds))
         key = key[~self.replaced[key // 4]]

@@ -144,7 +144,10 @@ def unmeasured(flora: Flora) -> list[int]:
 def measuring(flora: Flora, species: Collection[int]) -> Generator[tuple[str, float], None, None]:
     """Measure weights that are not known yet; `facet_weights` has them afterward.
 
-    Yields names of species at work, and the fraction of their measurement that is done.
+    Yields
+    ------
+    str, float
+        Name of the species at work, and the fraction of its measurement that is done.
     """
     for number in sorted(set(species) & set(unmeasured(flora))):
         every = needed(flora, number)
@@ -206,8 +209,17 @@ def shipped() -> dict[str, Floats32]:
 def fitting(flora: Flora, number: int, rays: float = np.inf) -> Generator[float, None, Floats]:
     """Measure the weights (2, r, k) of one species: of sub-plants, and of what branches themselves bear.
 
-    Yields the fraction that is done. Each weight follows from so many blocked rays, about; the lattice is made coarser
-    where there are more.
+    Parameters
+    ----------
+    number : int
+        Index of the species.
+    rays : float
+        Blocked rays that each weight is to follow from, about; the lattice is made coarser where there are more.
+
+    Yields
+    ------
+    float
+        Fraction that is done.
     """
     rows = np.flatnonzero(flora.rows["species"] == number)
     out, seen, done, every = np.ones((2, len(rows), len(COUNTS))), {}, 0, 2 * len(rows)
@@ -534,9 +546,18 @@ def needed(flora: Flora, number: int) -> list[tuple[Flora, int]]:
 
 
 def weights_of(flora: Flora, number: int, states: tuple[int, ...], known: Known) -> Floats:
-    """Weights (2, s, r, k) of a species of a flora in summer, in states that are indices of `SHARES`; 1 in the others.
+    """Weights (2, s, r, k) of a species of a flora in summer, in some states; 1 in the others.
 
-    ``known`` tells what was measured of those that are `needed`.
+    Parameters
+    ----------
+    flora : Flora
+        In summer.
+    number : int
+        Index of the species.
+    states : tuple of int
+        Indices of `SHARES`.
+    known : callable
+        What was measured of those that are `needed`.
     """
     own, last = flora.species[number], max(states)
     if own.aged is None:

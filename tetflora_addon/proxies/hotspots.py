@@ -77,8 +77,14 @@ _MEANS = _means()
 def balance(chord: Floats, extinction: Floats, leaf: Floats, facet: Floats) -> Floats:
     """Light (n,) that leaves send to the eye once over what facets do, which send as much in all directions.
 
-    Chords (n,) are 2 sin(ψ / 2) of the angle ψ between light and eye, extinctions (n,) are in 1/m. Leaves and facets
-    (n,) are roots of areas, meters; facets are not smaller than leaves.
+    Parameters
+    ----------
+    chord : (n,) float64
+        2 sin(ψ / 2) of the angle ψ between light and eye.
+    extinction : (n,) float64
+        1/m.
+    leaf, facet : (n,) float64
+        Roots of the areas, meters. Facets are not smaller than leaves.
     """
     chord = np.maximum(chord, 1e-3)
     small, large = _CHORD * extinction * leaf, _CHORD * extinction * np.maximum(facet, leaf)

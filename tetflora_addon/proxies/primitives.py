@@ -79,11 +79,18 @@ def triangles_of(facets: Facets) -> Triangles:
 
 
 def spheres_of(facets: Facets, camera: Camera | None, disc: float = np.pi, sun: Floats | None = None) -> Spheres:
-    """A sphere for each facet (n,), which covers for a camera what its facet covers.
+    """A sphere for each facet.
 
-    Without a camera it covers what its facet covers for light from above, of an even sky or of the strongest sun, which
-    comes from a unit vector (3,): for facets that only cast shadows and light up others. ``disc`` is the area that a
-    renderer draws for a sphere of radius 1; some draw fewer pixels than a circle has.
+    Parameters
+    ----------
+    facets : Facets of n
+    camera : Camera or None
+        That for which each sphere covers what its facet covers. Without, it covers what its facet covers for light
+        from above: for facets that only cast shadows and light up others.
+    disc : float
+        Area that a renderer draws for a sphere of radius 1; some draw fewer pixels than a circle has.
+    sun : (3,) float64, optional
+        Where the strongest sunlight comes from, a unit vector. Without, light comes from an even sky.
     """
     cover = cover_for_light(facets, sun) if camera is None else np.maximum(facing(facets, camera), LEAST_COVER)
     radius = facets.side * np.sqrt(cover / disc)

@@ -47,9 +47,16 @@ def summarize(
     count: int,
     assets: tuple[PlacedAssets, InCells[AssetParts]] | None = None,
 ) -> Summaries:
-    """Sum up contents by tetrahedron: so many summaries, to which nodes of the tree contribute by index (nodes,).
+    """Sum up contents by tetrahedron.
 
-    Contents of nodes with −1 are skipped. Clusters of instances are from `SharedAssets.held`.
+    Parameters
+    ----------
+    index : (nodes,) int
+        Number of the summary that each node of the tree contributes to; contents of nodes with −1 are skipped.
+    count : int
+        Number of summaries.
+    assets : PlacedAssets, Held of AssetParts, optional
+        Clusters of instances, from `SharedAssets.held`.
     """
     sums = np.zeros((count, 16))  # area, then times area: color, transmission, moment, clumping
     for held in (contents.subplants, contents.pieces):
@@ -141,10 +148,16 @@ def _moments(sums: Floats) -> Floats:
 def extinction_matrices(summaries: Summaries, volumes: Floats) -> tuple[NDArray, NDArray, NDArray]:
     """Extinction by direction, as it is between clusters of leaves, and the plane that the surfaces resemble.
 
-    S (n, 6) are Sxx, Syy, Szz, Sxy, Sxz, Syz with κ(ω) = √(ωᵀSω), 1/m² (the form of Heitz, Dupuy, Crassin and
-    Dachsbacher, "The SGGX Microflake Distribution", 2015). Most normals lie in axes (n, 3). Weights (n,) are 0 for
-    surfaces that face all ways, 1 for parallel ones: (3 λmax − 1) / 2 of the moment, those of the paper's plane term
-    (section 7) for two-sided surfaces.
+    Returns
+    -------
+    S : (n, 6) float64
+        Sxx, Syy, Szz, Sxy, Sxz, Syz with κ(ω) = √(ωᵀSω), 1/m² (the form of Heitz, Dupuy, Crassin and Dachsbacher, "The
+        SGGX Microflake Distribution", 2015).
+    normal : (n, 3) float64
+        Axis in which most normals lie.
+    plane : (n,) float64
+        0 for surfaces that face all ways, 1 for parallel ones: (3 λmax − 1) / 2 of the moment, the weight of the
+        paper's plane term (section 7) for two-sided surfaces.
     """
     values, vectors = np.linalg.eigh(summaries.moment)
     density = summaries.effective_area(volumes) / volumes

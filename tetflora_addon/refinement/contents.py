@@ -235,10 +235,13 @@ def large_polygons(polygons: Polygons, camera: Camera) -> Mask:
 
 
 def bounding_capsules(flora: Flora, subplants: Branches) -> Floats:
-    """Bodies (9, n) that hold all vertices of sub-plants, from the compiled bounds alone; meters, world space.
+    """Bodies that hold all vertices of sub-plants, from the compiled bounds alone.
 
-    A cylinder, and how far whatever is not within it reaches beyond: center (3), axis (3), radius, half of the height,
-    and that pad.
+    Returns
+    -------
+    (9, n) float64
+        A cylinder, and how far whatever is not within it reaches beyond: center (3), axis (3), radius, half of the
+        height, and that pad. Meters, world space.
     """
     bound, pad = bounds(flora, subplants)
     bound = bound.T
@@ -266,10 +269,18 @@ DESCEND_BATCH = 200_000
 
 
 def cut(polygons: Polygons, planes: Floats, slack: Floats | float = 0.0) -> tuple[Integers, Integers, Polygons]:
-    """Clip polygons (n,) by a plane (n, 4) each: polygons and sides (k,) of fragments, and these.
+    """Clip polygons (n,) by a plane (n, 4) each.
 
-    Sides are 0 where the distance is negative. A triangle that crosses leaves one fragment on one side and two on the
-    other; those that reach beyond their plane by no more than ``slack`` (n,), in meters, stay whole.
+    Triangles that reach beyond their plane by no more than ``slack`` (n,), in meters, stay whole.
+
+    Returns
+    -------
+    owner : (k,) int64
+        Polygon that each fragment comes from.
+    side : (k,) int64
+        0 where the distance is negative, 1 elsewhere.
+    fragments : Polygons of k
+        A triangle that crosses leaves one fragment on one side and two on the other.
     """
     owner, whole = polygons.as_fragments()
     distance = whole.corner_distances(planes[owner])

@@ -70,10 +70,21 @@ def sun_of(lights: Sequence[Light]) -> Floats | None:
 
 
 def light_views(light: Light, vertices: Floats, points: Floats, resolution: int) -> list[Camera]:
-    """Flat cameras through which a light sees points (m, 3) that receive it, with images of a longer side in pixels.
+    """Flat cameras through which a light sees what receives it.
 
-    Tetrahedra (n, 4, 3) stand in the light, meters. There are none where nothing stands between the sun and what
-    receives its light.
+    Parameters
+    ----------
+    vertices : (n, 4, 3) float64
+        Tetrahedra that stand in the light, meters.
+    points : (m, 3) float64
+        What receives it, meters.
+    resolution : int
+        Longer side of their images, pixels.
+
+    Returns
+    -------
+    list of Camera
+        Empty where nothing stands between the sun and what receives its light.
     """
     frame = frame_toward(light.direction)
     if light.kind == "SUN":

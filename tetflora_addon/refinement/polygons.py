@@ -57,7 +57,12 @@ class Surface:
 class Meshes:
     """Surfaces and where their instances stand; polygons refer to its faces, triangles and instances by number.
 
-    Each instance shows a surface (i,), by a matrix (i, 4, 4) to world space; any affine map.
+    Parameters
+    ----------
+    surface : (i,) int
+        Which of them each instance shows.
+    matrices : (i, 4, 4) float64
+        Of instances, to world space; any affine map.
 
     Raises
     ------
@@ -246,10 +251,15 @@ class Polygons(Arrays):
         return np.where(self.part >= 0, 1, self.meshes.face_size[self.face] - 2)
 
     def triangles(self) -> tuple[Integers, Integers, Floats]:
-        """Triangles of whole faces, and fragments, in the order of the polygons: polygons and triangles (k,), and
-        fractions (k,).
+        """Triangles of whole faces, and fragments, in the order of the polygons.
 
-        Fractions are of the triangle's area; 1 except for fragments.
+        Returns
+        -------
+        owner : (k,) int64
+            Polygon that each belongs to.
+        triangle : (k,) int64
+        fraction : (k,) float64
+            Of the triangle's area; 1 except for fragments.
         """
         cut = self.part >= 0
         owner, index = spread(self.triangle_counts)

@@ -63,11 +63,20 @@ def pixel_rays(camera: Camera, width: int, height: int) -> tuple[Floats, Floats]
 
 
 def tetrahedron_fragments(vertices: Floats, camera: Camera, width: int, height: int) -> Fragments:
-    """What the rays through the centers of pixels of a small image meet of positively oriented tetrahedra (n, 4, 3).
+    """What the rays through the pixels' centers meet of each tetrahedron.
 
-    These may hold the eye or cross its plane. There is one fragment for each pixel whose ray goes through a
-    tetrahedron; one that lies in view between the pixels' centers has a single one, in the pixel of its projected
-    centroid, one out of view has none.
+    Parameters
+    ----------
+    vertices : (n, 4, 3) float64
+        Positively oriented tetrahedra, meters, world space. They may hold the eye or cross its plane.
+    width, height : int
+        Size of the small image, pixels.
+
+    Returns
+    -------
+    Fragments
+        One for each pixel whose ray goes through a tetrahedron. One that lies in view between the pixels' centers has
+        a single fragment, in the pixel of its projected centroid. One out of view has none.
 
     Notes
     -----

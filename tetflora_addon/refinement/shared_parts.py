@@ -118,8 +118,12 @@ class SharedParts(Generic[Parts]):
     somebody asks for `parts` or `points`; new points take the places of those on opened parts.
 
     Parts are `Arrays` with the columns ``totals`` and ``extent``, meters. Subclasses say what can be opened, into what,
-    and which points are on it. Where proxies fill their tetrahedra (``filled``), small ones without points would be
-    holes.
+    and which points are on it.
+
+    Parameters
+    ----------
+    filled : bool
+        Whether proxies fill their tetrahedra, so that small ones without points would be holes.
     """
 
     def __init__(self, camera: Camera, filled: bool) -> None:
@@ -172,10 +176,19 @@ class SharedParts(Generic[Parts]):
         return self._parts.nbytes + self._figures.nbytes + self._points.nbytes
 
     def update(self, tree: TetrahedralTree, dividing: Mask, edge: Floats) -> NDArray:
-        """Hand points in divided nodes, a mask (nodes,), on, and open what is large there; nodes whose contents have
-        changed.
+        """Hand points in divided nodes on, and open what is large there.
 
-        ``edge`` (nodes,) is the longest edge of each, meters.
+        Parameters
+        ----------
+        dividing : (nodes,) bool
+            Nodes that have been divided.
+        edge : (nodes,) float64
+            Their longest edge, meters.
+
+        Returns
+        -------
+        (nodes,) bool
+            Nodes whose contents have changed.
         """
         points = self._points.rows
         changed = dividing.copy()
@@ -266,11 +279,21 @@ def share_points(
     along: Integers | int = 0,
     room: int = MOST_BEYOND,
 ) -> SharePoints:
-    """Points on parts of plants (n), sub-plants or, if their lines are given, branches alone; all in the root.
+    """Points on parts of plants, all in the root.
 
-    The parts are so many pixels (n,) large in the image. There are so many times as many points as usual; ``along``
-    (n,) are those on the wood of branches alone at least; and leaves have so much ``room`` for all of them, beyond the
-    fewest.
+    Parameters
+    ----------
+    parts : PlantParts of n
+        Sub-plants, or if ``lines`` are given branches alone.
+    pixels : (n,) float64
+        Extent of the parts in the image.
+    lines : Axes of n, optional
+    times : int
+        How many times as many points as usual.
+    along : (n,) int64, optional
+        Points on the wood of branches alone at least.
+    room : int, optional
+        Points on leaves that all of them have at most, beyond the fewest.
     """
     solid = are_solids(flora.rows)[parts.branches.row]
     squares = np.clip((pixels / PIXELS_IN_SOLID) ** 2, FEWEST_IN_SOLID, MOST_IN_SOLID)
@@ -341,8 +364,10 @@ def _sampled(
 def opened(flora: Flora, parts: PlantParts) -> Iterator[tuple[PlantParts, Integers, Axes | None]]:
     """Open sub-plants into branches alone and the sub-plants of the next order.
 
-    Yields some of the new parts (m,), of one of the two kinds, the part (m,) that each comes from, and the axes of
-    branches alone.
+    Yields
+    ------
+    PlantParts of m, (m,) int64, Axes or None
+        Some of the new parts, of one of the two kinds, the part that each comes from, and the axes of branches alone.
     """
     segments = flora.rows["segments"][parts.branches.row]
     for number in np.flatnonzero(np.bincount(segments)):  # bending takes as long for all as for the most

@@ -98,10 +98,17 @@ class AlphaBuffer:
         self._changed = np.zeros(self.width * self.height, bool)
 
     def add(self, cells: Integers, vertices: Floats, extinction: ArrayLike) -> Outline:
-        """Draw tetrahedra (n, 4, 3), positively oriented and overlapping with none that is there, meters.
+        """Draw tetrahedra.
 
-        Cells (n,) are their numbers from now on, zero or positive, each new. Extinctions κ ≥ 0 (n,) along the way from
-        the eye, 1/m, may be infinite.
+        Parameters
+        ----------
+        cells : (n,) int
+            Their numbers from now on, zero or positive, each new.
+        vertices : (n, 4, 3) float64
+            Positively oriented, overlapping with none that is there, meters, world space.
+        extinction : (n,) float64
+            κ ≥ 0 along the way from the eye, 1/m; may be infinite.
+
         """
         count = len(vertices)
         fragments = tetrahedron_fragments(vertices, self.camera, self.width, self.height)
@@ -183,7 +190,12 @@ def fitting(cells: int, finest: int) -> int:
 class Buffers:
     """Alpha buffers as fine as what is drawn into them: a few large tetrahedra need few pixels.
 
-    The finest has so many pixels on its longer side; triangles (t, 3, 3) of explicit polygons hide what is behind them.
+    Parameters
+    ----------
+    resolution : int
+        Longer side of the finest buffer, pixels.
+    occluders : (t, 3, 3) float64, optional
+        Triangles of explicit polygons that hide what is behind them, meters.
     """
 
     def __init__(self, camera: Camera, resolution: int, occluders: Floats | None = None) -> None:
