@@ -105,12 +105,22 @@ def row_leaves(rows: Table, forms: Sequence[Sequence[Sequence[LeafModel]]], tran
 def own_leaf_integrals(
     size_tip: Floats, size_young: Floats, outward: tuple[Floats, Floats], along: tuple[Floats, Floats] | None
 ) -> tuple[Floats, Floats, Floats]:
-    """Means (n,) over leaves that sit evenly between two places: of (size)² / (size of old leaves inside)²; of that
-    times the place between inside and outside; and of that times the youth of leaves (`growth.foliage.youth`).
+    """Means over leaves that sit evenly between two places.
 
-    Factors (n,) are on the size of leaves outside, and of young ones. ``outward`` are where the two places (n,) lie
-    between inside and outside of the crown, ``along`` where along the branch of the order; None where no leaves are
-    young.
+    Parameters
+    ----------
+    size_tip, size_young : (n,) float64
+        Factors on the size of leaves outside, and of young ones.
+    outward : pair of (n,) float64
+        Where the two places lie between inside and outside of the crown,
+    along : pair of (n,) float64, optional
+        and along the branch of the order; None where no leaves are young.
+
+    Returns
+    -------
+    (n,) float64, three times
+        Means of (size)² / (size of old leaves inside)²; of that times the place between inside and outside; and of that
+        times the youth of leaves (`growth.foliage.youth`).
     """
     low, high = outward
     k = size_tip - 1
@@ -351,7 +361,16 @@ def _over(own: Floats, plain: Floats) -> Floats:
 
 
 def shaped_totals(rows: Table, totals: Averages, polygons: Floats) -> ShapedTotals:
-    """Totals of all rows (r,), from those of plants as described and faces (r,) of a leaf of each row."""
+    """Totals of all rows.
+
+    Parameters
+    ----------
+    rows : (r,) parameter table
+    totals : Averages
+        Of plants as described.
+    polygons : (r,) float64
+        Faces of a leaf of each row.
+    """
     every = np.arange(len(rows))
     bearing = (rows["next"][:, (LATERAL, DEAD, FORK)] >= 0).any(axis=1)
     solid = rows["phantom"] | rows["drawn"] | (rows["envelope"] > 0)
@@ -559,9 +578,15 @@ def _mixed(summer: Floats, area: Floats, left: list[Floats], year: Table, hue: F
 def totals_of_day(
     rows: Table, species: Sequence[Species], season: seasons.Season, totals: Averages, leaf: RowLeaves
 ) -> tuple[Table, DayTotals] | None:
-    """Rows (r,) on a day, and totals of their sub-plants; None where no plant is other than in summer.
+    """Rows on a day, and totals of their sub-plants; None where no plant is other than in summer.
 
-    Averages and leaves are those of the same rows.
+    Parameters
+    ----------
+    rows : (r,) parameter table
+    totals : Averages
+        Of the same rows.
+    leaf : RowLeaves
+        Likewise.
     """
     if all(one.year is None for one in species):
         return None

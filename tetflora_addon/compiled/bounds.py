@@ -102,10 +102,20 @@ def _tilted(bound: NDArray, angle: NDArray, scale: NDArray) -> tuple[NDArray, ND
 
 
 def unit_bounds(rows: Table, raised: bool = False) -> Floats:
-    """Cylinders (r, 3) that hold every axis of every sub-plant whose branch has unit length: radius, lowest, highest z.
+    """Cylinders that hold every axis of every sub-plant whose branch has unit length.
 
-    They are in the frame of the branch's base; z is at most 0 at the bottom and at least 0 on top. If ``raised``, also
-    if plants have crown bases (see `growth.crown_effects`), so that any limb may be anywhere above where they begin.
+    Parameters
+    ----------
+    rows : (r,) table of `rows.build_rows`
+    raised : bool
+        Also if plants have crown bases (see `growth.crown_effects`), so that any limb may be anywhere above where they
+        begin.
+
+    Returns
+    -------
+    (r, 3) float64
+        Radius, lowest and highest z, in the frame of the branch's base; z is at most 0 at the bottom and at least 0 on
+        top.
     """
     bounds = np.zeros((len(rows), 3))
     for index in range(len(rows) - 1, -1, -1):
@@ -126,10 +136,15 @@ def limb_reaches(rows: Table, bounds: Floats) -> Floats:
 
 
 def leaf_reaches(rows: Table, bounds: Floats, model_reach: Floats) -> Floats:
-    """How far leaves and short shoots stick out beyond the axes of sub-plants (r,) at plant scale 1, meters.
+    """How far leaves and short shoots stick out beyond the axes of sub-plants at plant scale 1, meters.
 
-    Bounds (r, 3) are of `unit_bounds`; ``model_reach`` (r,) is the distance of the farthest vertex from the base of the
-    leaf that each row bears, for a leaf of size 1.
+    Parameters
+    ----------
+    rows : (r,) table
+    bounds : (r, 3) float64
+        Of `unit_bounds`.
+    model_reach : (r,) float64
+        Distance of the farthest vertex from the base of the leaf that each row bears, for a leaf of size 1.
     """
     reach, widest = own_leaf_reaches(rows, model_reach), widest_radii(rows)
     for index in range(len(rows) - 1, -1, -1):

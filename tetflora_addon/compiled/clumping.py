@@ -51,9 +51,19 @@ def basis(direction: Floats) -> tuple[Floats, Floats]:
 
 
 def covered(corners: Floats, first: Integers, number: Integers) -> tuple[Integers, Integers]:
-    """Flat polygons (m,), and the points of whole coordinates (m, 2) that each covers, by the even-odd rule.
+    """Points of whole coordinates that flat polygons cover, by the even-odd rule.
 
-    Corners (c, 2) are those of polygon after polygon (f,), each in order: the first of each, and how many it has.
+    Parameters
+    ----------
+    corners : (c, 2) float64
+        Polygon after polygon, each in order.
+    first, number : (f,) int
+        First corner of each polygon, and how many it has.
+
+    Returns
+    -------
+    polygon : (m,) int
+    point : (m, 2) int64
     """
     if len(first) == 0:
         return np.zeros(0, np.intp), np.zeros((0, 2), np.int64)
@@ -88,10 +98,22 @@ def cell_numbers(points: Sequence[Floats], shape: Integers) -> Integers:
 
 
 def path_lengths(origin: Floats, direction: Floats, shape: Integers) -> tuple[Integers, Integers, Floats]:
-    """Ways of parallel rays through the tetrahedra of a lattice of so many cubes along each axis (3,).
+    """Ways of parallel rays through the tetrahedra of a lattice.
 
-    Origins (n, 3) are in units of the cubes, the direction (3,) is a unit vector. Rays, cells and lengths (m,) in the
-    same units.
+    Parameters
+    ----------
+    origin : (n, 3) float64
+        In units of the lattice's cubes.
+    direction : (3,) float64
+        Unit vector.
+    shape : (3,) int64
+        Cubes along each axis.
+
+    Returns
+    -------
+    ray, cell : (m,) int64
+    length : (m,) float64
+        In the same units.
     """
     steep = np.where(np.abs(direction) < 1e-9, 1e-9, direction)
     ends = np.sort(np.stack([-origin / steep, (shape - origin) / steep]), axis=0)
@@ -239,10 +261,19 @@ def elements_of(
     length: Floats,
     orders: int | None = None,
 ) -> PlantElements:
-    """Grow sub-plants of one species, whose leaves have models by kind, to the last leaf, or only so many orders.
+    """Grow a sub-plant to its last leaf.
 
-    ``group`` (k,) are numbers of the order of each of the species' rows, from the first on; ``length`` (r,) is the
-    usual length of a branch of each row at plant scale 1, meters.
+    Parameters
+    ----------
+    forms : by kind
+        Models of leaves of the species.
+    subplants : Branches of one species
+    group : (k,) int
+        Number of the order of each of the species' rows.
+    first : int
+        First of these.
+    length : (r,) float64
+        Usual length of a branch of each row at plant scale 1, meters.
     """
     parts, groups, dense = [], [], []
     while len(subplants) and orders != 0:
@@ -342,15 +373,18 @@ def fit_clumping(
     width: Floats,
     length: Floats,
 ) -> Clumping:
-    """Fit every species, with models of leaves by species and kind.
+    """Fit every species.
 
     Parameters
     ----------
+    rows : (r,) parameter table
+    forms : by species and kind
+        Models of leaves.
     area : (r, r) float64
         Expected optical area of a sub-plant by the row that contributes it.
     polygons, width, length : (r,) float64
-        Expected faces of a sub-plant, width of its leaves (0 without) and length of its branch, meters at plant scale
-        1.
+        Expected faces of a sub-plant, width of its leaves (0 without) and length of its branch, meters at plant
+        scale 1.
     """
     root, density, own = np.zeros((3, len(rows)))
     usual = np.where(length > 0, length, 1.0)
@@ -498,9 +532,16 @@ _PLACES = {"species", "next", "drawn_rows", "sunlit", "dead"}
 
 
 def fingerprint(rows: Table, forms: Sequence[Sequence[LeafModel]], method: int) -> str:
-    """Hash of a species' parameters, its rows (r,) alone, and models of its leaves by kind: 16 hexadecimal digits.
+    """Hash of a species' parameters and the forms of its leaves: 16 hexadecimal digits.
 
-    ``method`` counts the ways in which results were found so far.
+    Parameters
+    ----------
+    rows : (r,) parameter table
+        Of this species alone.
+    forms : by kind
+        Models of leaves.
+    method : int
+        Counts the ways in which results were found so far.
     """
     content = hashlib.sha256(f"{method}".encode())
     for name in sorted(set(rows.dtype.names) - _PLACES):

@@ -262,8 +262,10 @@ class Flora:
 def compile_species(species: Sequence[Species]) -> Flora:
     """Compile the species of a scene; the last few results are kept, by content.
 
-    A leaf that is still the name of a Blender object, which the bridge to Blender has to replace first, is a
-    `SpeciesError`.
+    Raises
+    ------
+    SpeciesError
+        A species whose leaf is still the name of a Blender object (the bridge to Blender has to replace it first).
     """
     return _compiled(tuple(with_quality(with_habit(one, one.habit), one.quality) for one in species))
 
@@ -373,11 +375,23 @@ def shaped_subplants(rows: Table, subplants: Branches) -> Integers:
 def placed_samples(
     flora: Flora, points: Points, subplants: Branches, owner: Integers, pick: Integers, turn: Floats | None = None
 ) -> tuple[NDArray[np.floating], Floats | None]:
-    """Samples of sub-plants: places (m, 3) in units of their lengths and in their axes, and what each (m,) stands for.
+    """Samples of sub-plants: places in units of their lengths and in their axes, and what each stands for.
 
-    That is area over that of other samples of the same sub-plant, 1 on the mean; None where all stand for as much.
-    ``points`` are leaves or wood; ``owner`` and ``pick`` (m,) are sub-plants, and samples of these; by ``turn`` (m,)
-    the axes of the sub-plant are turned about the third for each.
+    Parameters
+    ----------
+    points : Points
+        Leaves or wood of its samples.
+    subplants : Branches of n
+    owner, pick : (m,) int
+        Sub-plants, and samples of these.
+    turn : (m,) float64, optional
+        By how much the axes of the sub-plant are turned about the third for each.
+
+    Returns
+    -------
+    (m, 3) float
+    (m,) float64 or None
+        Area over that of other samples of the same sub-plant, 1 on the mean; None where all stand for as much.
     """
     place, rows = gathered(points.position, pick), flora.rows
     some = shaped_subplants(rows, subplants)
@@ -526,8 +540,16 @@ def extents(flora: Flora, subplants: Branches, farthest: bool = True) -> Floats:
 def outlines(flora: Flora, plants: Branches, low: Floats, high: Floats) -> tuple[Floats, Floats, Floats, Floats]:
     """About how the crowns of plants (n,) differ from those of their species, whose ends are at heights (n,), (n,).
 
-    The unit (n,) of heights and widths of the species, meters; where the crown begins (n,), in such units; a factor
-    (n,) on its width; and by how much (n, 2) it reaches farther along the first two of the plant's axes.
+    Returns
+    -------
+    length : (n,) float64
+        Unit of heights and widths of the species, meters.
+    low : (n,) float64
+        Where the crown begins, in such units.
+    width : (n,) float64
+        Factor on its width.
+    light : (n, 2) float64
+        By how much it reaches farther along the first two of the plant's axes.
     """
     if plants.crown is None:
         return plants.length, low, np.ones(len(plants)), np.zeros((len(plants), 2))

@@ -141,11 +141,19 @@ def _frames_along(axis: Floats) -> Floats:
 def orientation_of(
     rows: Table, forms: Sequence[Sequence[Sequence[LeafModel]]], leaf: Floats, wood: Floats, length: Floats
 ) -> Orientation:
-    """Orientation of every row (r,), with models of leaves by species and kind.
+    """Orientation of every row.
 
-    ``leaf`` (r, r) is the expected area of leaves in a sub-plant by the row that bears them, ``wood`` (r, r) the
-    expected surface of branches by row, over length × radius of the sub-plant's own branch. Lengths (r,) are typical
-    ones of branches at plant scale 1, meters.
+    Parameters
+    ----------
+    rows : (r,) parameter table
+    forms : by species and kind
+        Models of leaves.
+    leaf : (r, r) float64
+        Expected area of leaves in a sub-plant by the row that bears them.
+    wood : (r, r) float64
+        Expected surface of branches by row, over length × radius of the sub-plant's own branch.
+    length : (r,) float64
+        Typical length of a branch at plant scale 1, meters.
     """
     nodes = NODES if rows["sunlit"].any() else NODES[:1]
     out = Orientation(*np.zeros((2, len(rows), len(nodes), _TERMS, 6)), np.zeros((len(rows), 1, _TERMS, 6)))

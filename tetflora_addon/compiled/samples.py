@@ -76,10 +76,19 @@ class Samples:
 def draw_samples(
     rows: Table, leaf_area: Floats, wood_area: Floats, length: Floats, some: Container[int], times: int
 ) -> Samples:
-    """Sample some rows, so many times as often as proxies need.
+    """Sample rows.
 
-    Areas (r, r) are expected in a sub-plant by the row that contributes them; lengths (r,) typical ones of branches,
-    meters.
+    Parameters
+    ----------
+    rows : (r,) parameter table
+    leaf_area, wood_area : (r, r) float64
+        Expected area in a sub-plant by the row that contributes it.
+    length : (r,) float64
+        Typical length of a branch, meters.
+    some : container of int
+        Which rows.
+    times : int
+        So many times as many as proxies need.
     """
     leaves, wood = [], []
     trunk = np.flatnonzero(np.diff(rows["species"], prepend=-1))
@@ -368,11 +377,20 @@ class Shares:
 def limbs_of(
     rows: Table, first: int, i: int, number: Integers, branches: Sequence[Branches], row: Integers, base: Branches
 ) -> Limbs:
-    """The limbs of samples (k) of one row ``i`` of a species, counted from its first row.
+    """The limbs of samples of one row.
 
-    Numbers (k, s) are those of the branches that samples are on, of each row of the species that these may be of;
-    branches are by row of the species. A row (k,) describes each sample; ``base`` are the branches of the sampled row
-    that these are on.
+    Parameters
+    ----------
+    first, i : int
+        First row of the species, and the row that is sampled, counted from there.
+    number : (k, s) int
+        Numbers of the branches that samples are on, of each row of the species that these may be of.
+    branches : sequence of Branches
+        By row of the species.
+    row : (k,) int
+        Row that describes each sample.
+    base : Branches of k
+        Branches of the row that is sampled on which samples are.
     """
     species, k = rows[first : first + number.shape[1]], len(row)
     out = Limbs(np.zeros((k, 3), np.float32), np.zeros(k, np.int8), np.zeros(k, np.float32))

@@ -118,7 +118,10 @@ def known_crown(species: Species) -> Crown | None:
 def crown_of(species: Species) -> Crown:
     """The mean crown of a species; its samples are drawn at the first time, which takes some tenths of a second.
 
-    A leaf that is still the name of a Blender object is a `SpeciesError`.
+    Raises
+    ------
+    SpeciesError
+        A leaf is still the name of a Blender object.
     """
     found = _known.get(species)
     if found is None:
@@ -232,9 +235,12 @@ _reaches: "WeakKeyDictionary[Flora, dict[int, TwigReach]]" = WeakKeyDictionary()
 
 
 def measured(flora: Flora, seeds: Seeds) -> tuple[Floats, Floats]:
-    """Heights of plants, to the highest leaf or wood, and means of the extents of their crowns to east and north, (n,).
+    """Heights of plants, to the highest leaf or wood, and means of the extents of their crowns to east and north.
 
-    Meters, about as plants are when all of them has grown.
+    Returns
+    -------
+    height, width : (n,) float64
+        Meters, about as plants are when all of them has grown.
     """
     height, width = np.zeros((2, len(seeds)))
 
@@ -246,10 +252,21 @@ def measured(flora: Flora, seeds: Seeds) -> tuple[Floats, Floats]:
 
 
 def fitted(flora: Flora, seeds: Seeds, height: Floats, width: Floats, times: int = 4) -> Floats:
-    """Factors (n, 2) that give plants the heights and crown widths (n,) that were measured, in meters.
+    """Factors that give plants the heights and crown widths that were measured.
 
-    They are on the scale, and on the lengths of limbs (the first column of crown shapes), and stay within their limits;
-    heights are met even then. Plants are measured so many times at most.
+    Parameters
+    ----------
+    seeds : Seeds of n
+    height, width : (n,) float64
+        Meters.
+    times : int
+        How often plants are measured at most.
+
+    Returns
+    -------
+    (n, 2) float64
+        Factors on the scale, and on the lengths of limbs (the first column of crown shapes), which stay within their
+        limits; heights are met even then.
     """
     out = np.ones((len(seeds), 2))
 

@@ -28,8 +28,15 @@ _STEMS = 2.0
 
 
 def shaped_trunks(rows: Table, row: Integers, frame: Floats, forms: Floats) -> tuple[Floats32, Floats]:
-    """The column ``crown`` (n, 6) of trunks of rows (n,), frames (n, 3, 3) and crown shapes (n, 6); factors (n,) on
-    radii.
+    """The column ``crown`` (n, 6) of trunks, and factors (n,) on their radii.
+
+    Parameters
+    ----------
+    row : (n,) int
+    frame : (n, 3, 3) float64
+        Of the trunks.
+    forms : (n, 6) float64
+        Crown shapes.
     """
     own = np.where((rows["phantom"][row] | (rows["envelope"][row] > 0))[:, None], PLAIN, forms)
     stool = are_stools(rows, row)
@@ -110,7 +117,13 @@ def limb_count_factors(rows: Table, row: Integers, base: ArrayLike) -> Floats:
 
 
 def child_factors(rows: Table, parent: Branches, azimuth: Floats, sort: int) -> tuple[Floats, Floats]:
-    """Factors (m,) on angles with parents (m,), and on lengths, of children of a sort at azimuths (m,), by the form."""
+    """What the form makes of children of a sort that leave parents (m,) at azimuths (m,).
+
+    Returns
+    -------
+    lean, length : (m,) float64
+        Factors on their angle with the parent, and on their length.
+    """
     trunk, one = rows["order"][parent.row] == 0, np.ones(len(parent))
     light = parent.crown[:, LIGHT].astype(np.float64)
     # Toward which side the child leaves is known without the wind, which turns all of the parent.
@@ -125,9 +138,15 @@ def child_factors(rows: Table, parent: Branches, azimuth: Floats, sort: int) -> 
 
 
 def handed_on(rows: Table, parent: Branches, sort: int, length: ArrayLike, azimuth: Floats, angle: Floats) -> Floats32:
-    """The column ``crown`` (m, 6) of children of a sort, of parents (m,), whose lengths have factors (m,).
+    """The column ``crown`` (m, 6) of children of a sort.
 
-    Azimuths and angles (m,) are those by which they are turned, see `growth.turned`.
+    Parameters
+    ----------
+    parent : Branches of m
+    length : (m,) float64
+        Factors on the lengths of the children.
+    azimuth, angle : (m,) float64
+        By which they are turned, see `growth.turned`.
     """
     out = np.zeros((COLUMNS, len(parent)), np.float32)
     on_limbs = (sort == SPUR) & (rows["order"][parent.row] > 0)

@@ -74,10 +74,21 @@ def axis_places(rows: Table, branches: Branches, row: Integers, owner: NDArray, 
 def leaf_sites(
     rows: Table, branches: Branches, lines: Axes, row: Integers, owner: Integers, key: Keys, t: Floats
 ) -> tuple[Floats, NDArray, Floats]:
-    """Where leaves are, the middles of those in solids, the bases of others (m, 3); frames (m, 3, 3) of the branch
-    there; and fractions (m,) of its axis.
+    """Where leaves are: the middles of those in solids, the bases of others.
 
-    Leaves are on branches ``owner`` (m,) of n, of rows (m,) or (1,), and have keys (m,); ``t`` is from `leaf_places`.
+    Parameters
+    ----------
+    branches, lines : Branches of n and their Axes
+    row : (m,) or (1,) int
+    owner : (m,) int
+        Branch of each leaf.
+    key : (m,) uint64
+    t : (m,) float64
+        From `foliage.leaf_places`.
+
+    Returns
+    -------
+    position (m, 3), frame (m, 3, 3) of the branch there, and fraction (m,) of its axis
     """
     at = axis_places(rows, branches, row, owner, t)
     position, frame = lines.at(owner, at)
@@ -109,8 +120,13 @@ def inclinations(kind: Integers, number: Floats) -> Floats:
 def inclined(frame: Floats32, kind: Integers, key: Keys) -> Floats32:
     """Frames (m, 3, 3) of leaves that stand by a distribution, all around their branch and turned in their own plane.
 
-    ``frame`` (m, 3, 3) is that of the branch where each leaf is, ``kind`` (m,) or (1,) an index into
-    `LEAF_INCLINATIONS`.
+    Parameters
+    ----------
+    frame : (m, 3, 3) float32
+        Of the branch where each leaf is.
+    kind : (m,) or (1,) int
+        Index into `LEAF_INCLINATIONS`.
+    key : (m,) uint64
     """
     angle = inclinations(kind, uniform(key, Draw.LEAF_INCLINATION))
     angle = np.where(uniform(key, Draw.LEAF_SIDE) < 0.5, angle, np.pi - angle)
@@ -233,10 +249,18 @@ def _rows_of(branches: Branches, owner: Integers) -> Integers32:
 def place_leaves(
     rows: Table, branches: Branches, lines: Axes, owner: Integers, index: Integers, key: Keys, t: Floats
 ) -> Leaves:
-    """Leaves (m,) at fractions (m,) of their branches, from `leaf_places`; call `face_light` to turn them to the sky.
+    """Leaves at given fractions of their branches; call `face_light` to turn them to the sky.
 
-    They are on branches ``owner`` (m,), by an index (m,) there, with keys from `leaf_keys`. Fastest where all branches
-    are of one row, because parameters are then the same for all.
+    Parameters
+    ----------
+    branches, lines : Branches of n and their Axes
+        Fastest where all are of one row, because parameters are then the same for all.
+    owner, index : (m,) int
+        Branch, and index of the leaf on it.
+    key : (m,) uint64
+        From `leaf_keys`.
+    t : (m,) float64
+        From `leaf_places`.
     """
     row = _rows_of(branches, owner)
     skies = None if lines.skies is None else lines.skies.astype(np.float32)
@@ -266,15 +290,18 @@ def leaf_frames(
     key: Keys,
     sky: NDArray[np.floating] | None = None,
 ) -> Floats32:
-    """Frames (m, 3, 3) of leaves before they turn to the light, of those (m, 3, 3) of the branch where each leaf sits.
+    """Frames (m, 3, 3) of leaves before they turn to the light.
 
     Parameters
     ----------
     row : (m,) or (1,) int
+    frame : (m, 3, 3) float32
+        Of the branch where each leaf sits.
     roll : (m,) float64
         Random number of the branch, 0 to 1: where around it its first leaf stands.
     index : (m,) int
         Number of the leaf on its branch.
+    key : (m,) uint64
     sky : (m, 3) float32, optional
         Where up is, if not along z.
     """
@@ -317,10 +344,21 @@ def _leaf_frames(frame: Floats32, azimuth: Floats32, angle: Floats32) -> Floats3
 
 
 def face_light(frame: NDArray[np.floating], light: Floats, sky: Floats) -> NDArray:
-    """Turn leaves with frames (n, 3, 3), across, along and upper side, to the sky, as far as their orders ask for.
+    """Turn leaves to the sky, as far as their orders ask for.
 
-    A light (n,) or (1,) of 0 leaves them as they are, 1 makes them level; ``sky`` (3,) or (n, 3) are unit vectors
-    toward it. The upper side is turned, the midrib follows by the least turn.
+    Parameters
+    ----------
+    frame : (n, 3, 3) float64 or float32
+        Leaf frames (across, along, upper side).
+    light : (n,) or (1,) float64
+        0 leaves them as they are, 1 makes them level.
+    sky : (3,) or (n, 3) float64
+        Unit vector toward the sky.
+
+    Returns
+    -------
+    (n, 3, 3), type of frame
+        Right-handed frames; the upper side is turned, the midrib follows by the least turn.
     """
     along, up, light, sky = _by_component(frame, light, sky)
     normal = _toward(up, light, sky, 1e-9)
@@ -339,7 +377,11 @@ def face_light(frame: NDArray[np.floating], light: Floats, sky: Floats) -> NDArr
 def settled(rows: Table, row: Integers, frame: NDArray[np.floating], light: Floats, sky: Floats) -> NDArray:
     """Leaf frames as they are in the end: turned to the light, then hanging, as far as their orders ask for.
 
-    Rows are (n,) or (1,), all else is as for `face_light`.
+    Parameters
+    ----------
+    row : (n,) or (1,) int
+    frame, light, sky
+        As for `face_light`.
     """
     frame = face_light(frame, light, sky)
     droop = rows["leaf_droop"][row]

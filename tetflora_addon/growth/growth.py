@@ -206,10 +206,20 @@ def radius_at(rows: Table, branches: Branches, t: Floats) -> Floats:
 def chosen_children(
     rows: Table, parents: Branches, lines: Axes, owner: Integers, index: Integers, counts: Integers, sort: int = LATERAL
 ) -> Branches:
-    """Some children (m,) of branches (n) with axes: which parent and which of its children each is (m,).
+    """Some children (m,) of branches.
 
-    ``counts`` (n,) are numbers of children of this sort, ``rows.LATERAL``, ``FORK``, ``SPUR`` or ``DEAD``, of each
-    parent.
+    Parameters
+    ----------
+    parents : Branches of n
+    lines : Axes of the same n
+    owner : (m,) int
+        Which parent.
+    index : (m,) int
+        Which of its children of this sort.
+    counts : (n,) int
+        Number of children of this sort of each parent.
+    sort : int
+        ``rows.LATERAL``, ``rows.FORK``, ``rows.SPUR`` or ``rows.DEAD``.
     """
     parent = parents.take(owner)
     path = int(_PATHS[sort])
@@ -325,7 +335,13 @@ class WholeBranches(Arrays):
     def knots(self, rows: Table) -> tuple[Integers, Floats, Floats]:
         """Where segments begin and end; a flared base has some more.
 
-        Branches (m,), in order, those of a branch from base to tip; fractions (m,) of their axes; and places (m, 3).
+        Returns
+        -------
+        owner : (m,) int64
+            Branch of each place, in order; those of a branch from base to tip.
+        t : (m,) float64
+            Fraction of its axis.
+        position : (m, 3) float64
         """
         rings = rows["rings"][self.branches.row]
         owner, index = spread(self.lines.segments + rings + 1)

@@ -165,10 +165,20 @@ def thinned(number: int, places: int) -> Integers:
 
 
 def systematic(weights: Floats, group: Integers, sort: Floats, numbers: Integers) -> Integers:
-    """Draw things (n,) by their weights from each of several groups, so many from each (systematic resampling).
+    """Draw things by their weights from each of several groups (systematic resampling).
 
-    From a group without members they are of all others. Draws are spread evenly over ``sort`` (n,), between −1 and 1,
-    within a group. Indices come group after group, each in an order in which any run is spread over all of it.
+    Parameters
+    ----------
+    weights : (n,) float64
+    group : (n,) int64
+    sort : (n,) float64
+        Between −1 and 1. Draws are spread evenly over these values within a group.
+    numbers : (groups,) int64
+        How many to draw from each group; from a group without members they are of all others.
+
+    Returns
+    -------
+    (sum of numbers,) int64 : indices, group after group, each in an order in which any run is spread over all of it
     """
     order = np.argsort(3 * group + sort, kind="stable")
     edges = np.concatenate([[0.0], np.cumsum(weights[order])])

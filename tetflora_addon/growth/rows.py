@@ -135,11 +135,19 @@ def varied_begin(begin: ArrayLike, varies: ArrayLike, draw: Floats) -> Floats:
 def spread_children(
     row: np.void, sort: int, bare: float = 0.0, dead: float = 0.0, among: Floats | None = None
 ) -> tuple[Floats, ...]:
-    """Children of one sort of a mean branch of a row that is not full-grown, as many as stand for all (512,).
+    """Children of one sort of a mean branch of a row that is not full-grown, as many as stand for all.
 
-    Where they are on the branch, and among those of the order's branch; how many each stands for, 1 on the mean; and
-    factors on their lengths. ``bare`` and ``dead`` are as in `living`; ``among`` (2,) is where the row's children begin
-    and end among those of the order's branch, by a crown shape.
+    ``bare`` and ``dead`` are as in `living`; ``among`` (2,) is where the row's children begin and end among those of
+    the order's branch, by a crown shape.
+
+    Returns
+    -------
+    t, fraction : (512,) float64
+        Where they are on the branch, and among those of the order's branch.
+    weight : (512,) float64
+        How many each stands for; 1 on the mean.
+    fading : (512,) float64
+        Factor on their lengths.
     """
     own, number = row["growing"][sort], row["count"][sort, 0]
     law = NodeLaw(own[BEGIN], own[END], own[POWER], own[WHOLE] * number, own[BELOW] * number)
@@ -239,10 +247,13 @@ def grown_nodes(
     chance: Floats,
     shaped: tuple[Floats, Floats] | None = None,
 ) -> Grown:
-    """Living nodes of branches for children of one sort, whose child indices begin at ``path``.
+    """Living nodes of branches for children of one sort.
 
     Parameters
     ----------
+    branches : Branches of n
+    sort, path : int
+        Of children, and where their child indices begin.
     wanted : (n,) float64
         How many nodes there are to be.
     start, draw : (n,) float64
@@ -309,7 +320,10 @@ class DrawnLines:
 def drawn_lines(branches: DrawnBranches) -> DrawnLines:
     """Drawn branches with even segments, as many as they have themselves, at most `MAX_SEGMENTS`.
 
-    A `SpeciesError` where there are more than `MAX_DRAWN` of them.
+    Raises
+    ------
+    SpeciesError
+        More than `MAX_DRAWN` branches.
     """
     number = len(branches)
     if number > MAX_DRAWN:
@@ -660,10 +674,22 @@ def _exact(some: Order | Dead) -> Order | Dead:
 
 
 def ranged(rows: Table, name: str, row: Integers, key: Keys, draw: int) -> NDArray:
-    """Value (n,) of one parameter, a range of `ROW_DTYPE`, for each branch: mean + variation × a signed random number.
+    """Value of one parameter for each branch: mean + variation × a signed random number of its key.
 
-    That is of a key (n,) and a `hashing.Draw`. A row (1,) stands for all; so may the value where it is the same for
-    all.
+    Parameters
+    ----------
+    name : str
+        A range of `ROW_DTYPE`.
+    row : (n,) int
+        Or (1,), which stands for all.
+    key : (n,) uint64
+    draw : int
+        See `hashing.Draw`.
+
+    Returns
+    -------
+    (n,) float64
+        Or (1,) where it is the same for all of one row.
     """
     return varied(rows[name][row], key, draw)
 

@@ -47,7 +47,10 @@ it is in summer; and the parts of the last that have the fresh color, those of a
 class Season:
     """A day of the year at a place. Fields with a label are properties of a scene, and documented by their tooltips.
 
-    A number that is none or is out of its limits is a `TetFloraError`.
+    Raises
+    ------
+    TetFloraError
+        A number that is none or is out of its limits.
     """
 
     day: float = setting(
@@ -154,7 +157,11 @@ def _numbers(leaf: LeafYear) -> np.void:
 def plant_years(rows: Table, row: Integers, key: Keys) -> Floats | None:
     """The day that it is for plants (n, 2), and where they stand among autumn colors, 0 to 1; None without seasons.
 
-    Rows (n,) are of their trunks.
+    Parameters
+    ----------
+    row : (n,) int
+        Of their trunks.
+    key : (n,) uint64
     """
     if not is_seasonal(rows):
         return None

@@ -72,7 +72,10 @@ sine of leaves' turns in a wind without gusts, ``flutter_rate`` their frequency,
 class Wind:
     """A wind at a moment. Fields with a label are properties of a scene, and documented by their tooltips.
 
-    A number that is none, a negative speed or loop, or gusts outside 0 to 1 are a `TetFloraError`.
+    Raises
+    ------
+    TetFloraError
+        A number that is none, a negative speed or loop, or gusts outside 0 to 1.
     """
 
     speed: float = setting(
@@ -163,11 +166,17 @@ def widest_sway(rows: Table) -> Floats:
 
 
 def sway(rows: Table, branches: Branches, ahead: float = 0.0) -> Floats:
-    """Rotation vectors (n, 3), radians, of branches' tips against their bases, so many seconds after the moment of
-    rows.
+    """Rotation vectors (n, 3), radians, of branches' tips against their bases.
 
     For plants drawn by hand ``branches`` are the whole plants: where they stand, and which way is up; what comes out is
     for each meter of height at scale 1.
+
+    Parameters
+    ----------
+    rows : parameter table in the wind
+    branches : Branches of n
+    ahead : float
+        Seconds after the moment of the rows.
     """
     row, air = branches.row, rows["air"][0]
     drawn = rows["drawn"][row]
@@ -243,10 +252,20 @@ def rotation_vectors(turn: Floats) -> Floats:
 
 
 def leaned(points: Floats, up: Floats, turn: Floats) -> Floats:
-    """Points (n, k, 3) of plants drawn by hand, bent over: all at one height turn alike, so that nothing comes apart.
+    """Points of plants drawn by hand, bent over: all at one height turn alike, so that nothing comes apart.
 
-    They count from where the plants stand; ``up`` (n, 3) are unit vectors along their upright axes, ``turn`` (n, 3)
-    rotation vectors across these for each meter of height.
+    Parameters
+    ----------
+    points : (n, k, 3) float64
+        From where the plants stand.
+    up : (n, 3) float64
+        Unit vectors along the plants' upright axes.
+    turn : (n, 3) float64
+        Rotation vector across ``up`` for each meter of height.
+
+    Returns
+    -------
+    (n, k, 3) float64
     """
     height = np.einsum("nki,ni->nk", points, up)
     axis, rate = axis_and_angle(turn)
@@ -268,9 +287,18 @@ def leaned(points: Floats, up: Floats, turn: Floats) -> Floats:
 def fluttered(rows: Table, row: Integers, frame: Floats32, key: Keys, gust: Floats, ahead: float = 0.0) -> Floats32:
     """Frames of leaves (n, 3, 3) turned about their bases: up and down, and about their midribs.
 
-    Axes are across, along the midrib, upper side; rows (n,) or (1,) are in the wind, gusts (n,) those of `gusts` where
-    they are. Keys (n,) are those of the leaves: their bits are as good as random numbers, and there are very many
-    leaves. It is so many seconds after the moment of the rows.
+    Parameters
+    ----------
+    rows : parameter table in the wind
+    row : (n,) or (1,) int
+    frame : (n, 3, 3) float32
+        Across, along the midrib, upper side.
+    key : (n,) uint64
+        Of the leaves; its bits are as good as random numbers, and there are very many leaves.
+    gust : (n,) float64
+        Of `gusts` where they are.
+    ahead : float
+        Seconds after the moment of the rows.
     """
     air = rows["air"][0]
     bits = [((key >> np.uint64(shift)) & np.uint64(0xFFFFF)).astype(np.float64) * 2.0**-20 for shift in (44, 24, 4)]
