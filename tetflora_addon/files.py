@@ -42,7 +42,13 @@ def is_identifier(text: str) -> bool:
 
 
 def path_in(folder: Path, name: str) -> Path:
-    """The path of a file right in a folder; an `OSError` if the name leads anywhere else."""
+    """The path of a file right in a folder.
+
+    Raises
+    ------
+    OSError
+        The name leads anywhere else.
+    """
     path = folder / name
     _refuse_nul(path)
     alone = name not in ("", ".", "..") and not set(name) & set("/\\:")
@@ -115,7 +121,10 @@ def write_whole(path: Path, content: bytes | str) -> None:
 def replace(part: Path, path: Path) -> None:
     """Put a file in the place of another one; on Windows wait a moment for whoever has that open, as virus scanners do.
 
-    An `OSError` if it cannot be put there.
+    Raises
+    ------
+    OSError
+        It cannot be put there.
     """
     for wait in (*_WAITS, None):
         try:

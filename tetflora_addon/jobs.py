@@ -62,7 +62,10 @@ def part_of(
 class Pace:
     """How long a job works between two redraws: a window that takes long to draw is drawn less often.
 
-    Where drawing takes no time, these are the least seconds of work.
+    Parameters
+    ----------
+    least : float
+        Seconds of work where drawing takes no time.
     """
 
     def __init__(self, least: float) -> None:

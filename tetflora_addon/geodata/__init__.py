@@ -2,9 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Real places: files of surveys and cities, coordinate systems, and trees seen from above.
 
-Whatever reads a file or looks at what came from one raises an `OSError` where that cannot be read, and a `SceneError`
-where it is broken or cannot be used. Its message begins with texts called ``what`` or ``where``, names the line, the
-feature or the tag, and says what to do.
+Texts called ``what`` or ``where`` begin messages of a `SceneError`, which says what to do.
 """
 
 from functools import cache

@@ -47,7 +47,15 @@ _PALETTE = 3
 
 
 def read_tiff(path: Path) -> Generator[Progress, object, Raster]:
-    """Read a GeoTIFF, or a TIFF with a world file; yields progress."""
+    """Read a GeoTIFF, or a TIFF with a world file; yields progress.
+
+    Raises
+    ------
+    OSError
+        It cannot be read.
+    SceneError
+        It is broken, or of a kind that cannot be used; names the tag.
+    """
     check_regular(path)
     with path.open("rb") as file:
         tags = _Tags(file, path.name)

@@ -60,9 +60,21 @@ class MapFeature:
 
 
 def read_outlines(path: Path, epsg: int = 0, kind: str = "") -> tuple[list[MapFeature], System, list[str]]:
-    """Read areas and lines of a file, their system (see `chosen_system`), and what is to be told; points are left out.
+    """Read areas and lines of a file, and what is to be told of it; points are left out.
 
-    They are told apart by their keys, or all taken for a kind.
+    Parameters
+    ----------
+    epsg : int
+        As of `chosen_system`.
+    kind : str
+        What all are taken for; empty to tell them by their keys.
+
+    Raises
+    ------
+    OSError
+        It cannot be read.
+    SceneError
+        It is broken, or has no outlines; names the feature.
     """
     features, system = read_features(path, epsg)
     found: list[MapFeature] = []

@@ -107,7 +107,15 @@ def upright(dx: float, dy: float) -> tuple[Floats, Floats]:
 
 
 def check_regular(path: Path) -> None:
-    """Refuse folders, links, pipes and devices."""
+    """Refuse folders, links, pipes and devices.
+
+    Raises
+    ------
+    OSError
+        There is nothing, or it cannot be looked at.
+    SceneError
+        It is one of these.
+    """
     if not is_regular(path):
         with suppress(ValueError):  # a zero in its name
             path.lstat()
@@ -115,7 +123,13 @@ def check_regular(path: Path) -> None:
 
 
 def in_degrees(raster: Raster, what: str) -> Raster:
-    """A raster of which no file tells the system; its cells may be so small that they are degrees."""
+    """A raster of which no file tells the system; its cells may be so small that they are degrees.
+
+    Raises
+    ------
+    SceneError
+        Nobody can tell; ``what`` begins the message.
+    """
     if raster.system != System() or not may_be_degrees(raster.outline):
         return raster
     cell = max(np.abs(raster.along).max(), np.abs(raster.down).max())
@@ -133,7 +147,13 @@ _DEGREES, _UNCLEAR = 0.003, 0.1  # cells: no ground is as fine in meters, or as 
 
 
 def checked_size(width: int, height: int, what: str) -> None:
-    """Refuse rasters that are too large, or have no cells."""
+    """Refuse rasters that are too large, or have no cells.
+
+    Raises
+    ------
+    SceneError
+        ``what`` begins the message.
+    """
     if min(width, height) < 2 or max(width, height) > MAX_SIDE or width * height > MAX_CELLS:
         raise SceneError(
             f"{what}{width:,} by {height:,} cells; from 2 by 2 to {MAX_CELLS:,} in all can be read. Crop it, or "
@@ -142,7 +162,15 @@ def checked_size(width: int, height: int, what: str) -> None:
 
 
 def read_ascii(path: Path) -> Generator[Progress, object, Raster]:
-    """Read an ASCII grid (Esri); yields progress. A file ``.prj`` beside it may name its coordinate system."""
+    """Read an ASCII grid (Esri); yields progress. A file ``.prj`` beside it may name its coordinate system.
+
+    Raises
+    ------
+    OSError
+        It cannot be read.
+    SceneError
+        It is broken; names the line.
+    """
     content = read_whole(path, MAX_TEXT)
     name, header, start = path.name, {}, 0
     for line, text in enumerate(content[:_HEAD].split(b"\n"), 1):
@@ -262,7 +290,15 @@ def system_beside(path: Path) -> System:
 
 
 def world_file(path: Path) -> list[Floats]:
-    """Middle of the first cell, and steps along and down, of the world file of an image."""
+    """Middle of the first cell, and steps along and down, of the world file of an image.
+
+    Raises
+    ------
+    OSError
+        It cannot be read.
+    SceneError
+        There is none, or it is broken; names the line.
+    """
     ending = path.suffix.lower()
     endings = f"{ending[:2]}{ending[-1:]}w", f"{ending}w", ".wld"
     found = beside(path, *endings)

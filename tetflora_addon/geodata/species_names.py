@@ -159,7 +159,10 @@ def species_named(name: str) -> Match | None:
 def best_of(names: Sequence[str], among: Container[str] | None = None) -> tuple[Match | None, str]:
     """The surest species of several names of a plant, and the name: a scientific one of two words comes first.
 
-    Only those count that are ``among`` identifiers of species, if these are given.
+    Parameters
+    ----------
+    among : container of str, optional
+        Identifiers of species that there are.
     """
     matches = [(match, name) for name in names if (match := species_named(name))]
     found = [(match, name) for match, name in matches if among is None or match.species in among]

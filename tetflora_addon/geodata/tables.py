@@ -56,7 +56,19 @@ class Table:
 def read_csv(path: Path, skip: bool = False, most: int | None = None) -> Table:
     """Read separated values; the first line names the columns, or the second after one such as ``sep=;``.
 
-    Rows with other numbers of values than the first line may be skipped; a preview wants so many rows at most.
+    Parameters
+    ----------
+    skip : bool
+        Leave out rows with other numbers of values than the first line.
+    most : int, optional
+        Rows at most, for a preview.
+
+    Raises
+    ------
+    OSError
+        It cannot be read.
+    SceneError
+        It is broken; names the line.
     """
     content = read_whole(path, MAX_BYTES)
     name = path.name
@@ -104,9 +116,21 @@ def read_csv(path: Path, skip: bool = False, most: int | None = None) -> Table:
 
 
 def read_points(path: Path, _skip: bool = False, most: int | None = None, chosen: int = 0) -> Table:
-    """Points of a file of features with their properties; an area counts as its middle, lines do not count.
+    """Points of a GeoJSON file with their properties; an area counts as its middle, lines do not count.
 
-    A preview wants so many features at most; the system chosen is as of `read_features`.
+    Parameters
+    ----------
+    most : int, optional
+        Features at most, for a preview.
+    chosen : int
+        As of `read_features`.
+
+    Raises
+    ------
+    OSError
+        It cannot be read.
+    SceneError
+        It is broken; names the feature.
     """
     features, system = read_features(path, chosen)
     name, without = path.name, 0
@@ -153,7 +177,13 @@ def flat_tags(properties: dict[str, Any]) -> dict[str, Any]:
 
 
 def coordinates(values: Any, where: str, texts: bool = False) -> Floats:
-    """Positions of GeoJSON as (n, 2); heights do not count, and numbers may be texts if asked for."""
+    """Positions of GeoJSON as (n, 2); heights do not count, and numbers may be texts if asked for.
+
+    Raises
+    ------
+    SceneError
+        They are no positions; ``where`` begins the message.
+    """
     try:
         points = np.array([(x, y) for x, y, *_ in values], np.float64).reshape(-1, 2)
         kinds = {type(number) for x, y, *_ in values for number in (x, y)}
@@ -203,7 +233,13 @@ class Quantity(NamedTuple):
 
 
 def cell_of(text: str, points: bool = False) -> Quantity:
-    """What a cell says; where other cells have decimal ``points``, a comma before three digits parts thousands."""
+    """What a cell says.
+
+    Parameters
+    ----------
+    points : bool
+        Other cells have decimal points, so that a comma before three digits parts thousands.
+    """
     text = text.strip().lower().strip("*").strip()
     if text in _MISSING:
         return Quantity(0.0, kind=NOTHING)
@@ -323,7 +359,13 @@ def _positions(values: object) -> list[list[float]]:
 
 
 def middle_of(points: Sequence[Sequence[float]]) -> tuple[float, float]:
-    """The centroid of a ring (n, 2), or the mean of less than three points; a `ValueError` if they are none."""
+    """The centroid of a ring (n, 2), or the mean of less than three points.
+
+    Raises
+    ------
+    ValueError
+        They are no points.
+    """
     ring = np.array([(x, y) for x, y, *_ in points], np.float64).reshape(-1, 2)
     if not np.isfinite(ring).all() or not len(ring):
         raise ValueError

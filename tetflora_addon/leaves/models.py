@@ -205,9 +205,21 @@ def mean_silhouette(model: LeafModel) -> float:
 
 
 def leaf_model(positions: ArrayLike, faces: list[list[int]], uv: ArrayLike | None = None) -> LeafModel:
-    """Build and check a leaf model of vertices (v, 3) and faces that name them; it has those that are used, in order.
+    """Build and check a leaf model.
 
-    ``uv`` (v, 2) are texture coordinates by vertex; x and y of the vertices where not given.
+    Parameters
+    ----------
+    positions : (v, 3) float
+        Vertices.
+    faces : list of list of int
+        Vertex indices of each face.
+    uv : (v, 2) float, optional
+        Texture coordinates by vertex; x and y of the vertices where not given.
+
+    Returns
+    -------
+    LeafModel
+        With the vertices that faces use, in the order given.
 
     Raises
     ------
@@ -286,10 +298,19 @@ def closed_parts(model: LeafModel) -> Integers:
 
 
 def rounded(model: LeafModel, times: int) -> tuple[LeafModel, float]:
-    """A model whose closed parts are divided so many times, each with the area that it had, and its error.
+    """A model whose closed parts are divided so many times, each with the area that it had.
 
-    Each time makes four faces of a triangle. The error is how far the middles of edges are from the round surface,
-    about, in units of the leaf's size.
+    Parameters
+    ----------
+    times : int
+        Each makes four faces of a triangle.
+
+    Returns
+    -------
+    LeafModel
+        Triangles where parts are closed, and the faces of all others.
+    error : float
+        How far the middles of its edges are from the round surface, about, in units of the leaf's size.
     """
     of_face = closed_parts(model)
     chosen = np.flatnonzero(of_face >= 0)
@@ -398,9 +419,19 @@ _BARE = 0.08
 
 
 def spined(model: LeafModel, spines: Spines, part: Integers) -> tuple[LeafModel, Floats32]:
-    """A model with spines on parts of it (f,), see `closed_parts`; spines and areoles come after its own faces.
+    """A model with spines on it.
 
-    What the color of the leaf is times that of each face is (f, 3) float32.
+    Parameters
+    ----------
+    part : (f,) int64
+        Its `bodies.closed_parts`, on which spines stand.
+
+    Returns
+    -------
+    LeafModel
+        Spines and areoles come after its own faces.
+    tint : (f, 3) float32
+        What the color of the leaf is times that of each face.
     """
     place, normal = _areoles(model, part, spines.distance)
     height, wide = (spines.distance * size for size in _CUSHION)

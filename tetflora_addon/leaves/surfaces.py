@@ -95,10 +95,16 @@ def _along(*factors: float | Floats) -> Floats:
 
 
 def surface(positions: Floats, faces: Integers, uv: Floats, solid: bool = False, error: float = 0.0) -> LeafSurface:
-    """A surface of triangles and quads: places (k, v, 3) of vertices in k variants, texture coordinates (v, 2).
+    """A surface of triangles and quads.
 
-    Faces (f, 4) name vertices; of triangles one is named twice in a row, or the last is -1. Less than three different
-    ones are none. All else is as of `LeafSurface`.
+    Parameters
+    ----------
+    positions : (k, v, 3) float64
+    faces : (f, 4) int
+        Vertices; of triangles one is named twice in a row, or the last is -1. Less than three different ones are none.
+    uv : (v, 2) float64
+    solid, error
+        As of `LeafSurface`.
     """
     faces = np.where(faces < 0, faces[:, :1], faces)
     kept = faces != np.roll(faces, -1, axis=1)
@@ -300,7 +306,13 @@ def outline(blade: Blade, tolerance: float = FINEST) -> Floats:
 
 
 def check_outline(blade: Blade) -> None:
-    """Refuse outlines that cross themselves with a `SpeciesError` that names what may be changed."""
+    """Refuse outlines that cross themselves.
+
+    Raises
+    ------
+    SpeciesError
+        Names what may be changed.
+    """
     if crossings(outline(blade, 0.002)):
         raise SpeciesError(
             "the outline crosses itself; use a smaller tooth_size or lobe_depth, fewer teeth, or a rounded base"
@@ -323,9 +335,14 @@ def crossings(points: Floats) -> int:
 
 
 def blade_surface(blade: Blade, tolerance: float, amount: float = 1.0) -> LeafSurface:
-    """A blade as polygons, in units of the whole leaf's length, within a tolerance in lengths of the blade.
+    """A blade as polygons, in units of the whole leaf's length.
 
-    Its variants differ by an amount from 0 to 1.
+    Parameters
+    ----------
+    tolerance : float
+        Of the outline, in lengths of the blade.
+    amount : float
+        How much its variants differ, 0 to 1.
     """
     step = _STEP * np.sqrt(tolerance)
     rows = max(int(np.ceil(1.0 / step)), 1)

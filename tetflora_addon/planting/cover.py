@@ -193,9 +193,14 @@ class Floor:
     fallen: Floats  # (species, cells): leaves that fall, m² on a square meter
 
     def suits(self, habitat: Habitat, species: int | None, seed: int) -> Suits:
-        """How suitable places are for a habitat, with patches of a seed.
+        """How suitable places are for a habitat.
 
-        It is shed by a species; by anything if that is None, by nothing that stands if -1.
+        Parameters
+        ----------
+        species : int or None
+            What sheds it; anything if None, nothing that stands if -1.
+        seed : int
+            Of the patches.
         """
         size, keeps = habitat.value
         key = child_key(key_of_seed(seed), _PATCHES + list(Habitat).index(habitat))

@@ -264,7 +264,12 @@ _BARE, _FULL = -0.1, 0.25  # values of the noise below which nothing grows, and 
 def gradient_noise(points: Floats, key: Keys) -> Floats:
     """Smooth noise with mean 0 between -1 and 1 (K. Perlin, "Improving noise", SIGGRAPH 2002, in two dimensions).
 
-    Points (n, 2) are in cells of the lattice, which has a key.
+    Parameters
+    ----------
+    points : (n, 2) float64
+        In cells of the lattice.
+    key : uint64
+        Of the whole lattice.
     """
     corner = np.floor(points)
     part = points - corner
@@ -284,10 +289,17 @@ def gradient_noise(points: Floats, key: Keys) -> Floats:
 
 
 def clumps(points: Floats, size: float, clumping: float, key: Keys) -> Floats:
-    """How suitable places (n, 2) on the map are, 0 to 1, (n,), for plants that grow in clumps.
+    """How suitable places are, 0 to 1, for plants that grow in clumps, (n,).
 
-    Clumps are so many meters from each other on average. With a clumping of 0 all places suit; with 1 none between
-    them.
+    Parameters
+    ----------
+    points : (n, 2) float64
+        Places on the map, meters.
+    size : float
+        Meters from clump to clump, on average.
+    clumping : float
+        0: suitable everywhere; 1: nothing between the clumps.
+    key : uint64
     """
     value = np.zeros(len(points))
     for octave, (frequency, weight) in enumerate(_OCTAVES):

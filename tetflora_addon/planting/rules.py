@@ -181,7 +181,13 @@ _NOT_NEGATIVE = (
 
 
 def check_rules(rules: Rules) -> None:
-    """Look through all rules; a `SceneError` tells the first that cannot be."""
+    """Look through all rules.
+
+    Raises
+    ------
+    SceneError
+        The first that cannot be.
+    """
     labels = {one.name: one.metadata.get("name", "Density") for one in fields(rules)}
     for name in _NOT_NEGATIVE:
         value = getattr(rules, name)
@@ -239,10 +245,20 @@ SQUARE_SIDES = 0.25
 def suggested_distance(
     radii: Sequence[float], weights: Sequence[float], scale: float = 1.0, density: float | None = None
 ) -> float:
-    """Distance in meters that suits a mixture, in two digits: that of plants with the mean area.
+    """Distance in meters that suits a mixture, in two digits.
 
-    Each plant has the area that its crown needs, by radii in meters and weights of species; negative ones count as 0.
-    Of so many plants on each square meter as are asked for, it is not so far that they do not fit.
+    Each plant has the area that its crown needs; the distance is that of plants with the mean area.
+
+    Parameters
+    ----------
+    radii : sequence of float
+        Of the crowns of the species, meters.
+    weights : sequence of float
+        Relative frequency of each species; negative ones count as 0.
+    scale : float
+        Mean scale of the plants.
+    density : float, optional
+        Plants for each square meter that the artist asks for: then not so far that they do not fit.
     """
     shares = [max(weight, 0.0) for weight in weights]
     whole = sum(shares)

@@ -98,7 +98,7 @@ def reach_of(brush: Brush) -> float:
 
 
 def paint(brush: Brush, center: Sequence[float], standing: Floats, key: Keys, dab: int) -> tuple[Floats, Keys]:
-    """Where one dab of a stroke, by its number, sets new plants: places (n, 2), and keys (n,) for `individuals`.
+    """Where one dab sets new plants.
 
     Parameters
     ----------
@@ -108,6 +108,14 @@ def paint(brush: Brush, center: Sequence[float], standing: Floats, key: Keys, da
         Plants that are there, those that the same stroke has set among them. Those far away may be left out.
     key : () uint64
         Of the stroke, see `stroke_key`.
+    dab : int
+        Number of the dab in its stroke.
+
+    Returns
+    -------
+    places : (n, 2) float64
+    keys : (n,) uint64
+        One for each place; `individuals` makes plants of them.
 
     Raises
     ------

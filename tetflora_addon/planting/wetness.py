@@ -69,9 +69,19 @@ def cell_for(triangles: Floats, finest: float, most: int) -> float:
 
 
 def height_grid(triangles: Floats, cell: float) -> HeightGrid:
-    """Heights of the highest of all triangles (t, 3, 3), meters, in cells of so many meters.
+    """Heights of the highest of all triangles.
 
-    Walls, which have no area on the map, do not count. A `SceneError` if there were more than `MOST_CELLS`.
+    Parameters
+    ----------
+    triangles : (t, 3, 3) float64
+        Corners, meters in world space; walls, which have no area on the map, do not count.
+    cell : float
+        Meters.
+
+    Raises
+    ------
+    SceneError
+        More than `MOST_CELLS`.
     """
     flat = triangles[..., :2].reshape(-1, 2)
     first = np.floor(flat.min(axis=0) / cell)

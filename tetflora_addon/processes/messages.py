@@ -47,7 +47,10 @@ class _Unpickler(pickle.Unpickler):
 class Packed:
     """An object as the bytes that are sent, so that they are made once for several receivers.
 
-    ``known`` tells the number of an object within it that is sent apart; None for all others.
+    Parameters
+    ----------
+    known : callable, optional
+        Number of an object within it that is sent apart; None for all others.
     """
 
     def __init__(self, thing: object, known: Callable[[object], int | None] | None = None) -> None:
@@ -75,7 +78,13 @@ class Packed:
 
 
 def send(stream: BinaryIO, *things: object) -> None:
-    """Write objects, or what is packed already, as one message; `Closed` or an `OSError` if the receiver has ended."""
+    """Write objects, or what is packed already, as one message.
+
+    Raises
+    ------
+    Closed, OSError
+        The receiver has ended.
+    """
     if stream.closed:
         raise Closed
     packed = [thing if isinstance(thing, Packed) else Packed(thing) for thing in things]
@@ -88,9 +97,18 @@ def send(stream: BinaryIO, *things: object) -> None:
 
 
 def receive(stream: BinaryIO, things: Mapping[int, object] | None = None) -> list[object]:
-    """Objects of the next message, whose arrays can be written to; `Closed` if the sender has ended.
+    """Objects of the next message; their arrays can be written to.
 
-    ``things`` are what was sent apart, by number.
+    Parameters
+    ----------
+    stream : file
+    things : mapping of int to object, optional
+        What was sent apart, by number.
+
+    Raises
+    ------
+    Closed
+        The sender has ended.
     """
     if stream.closed:
         raise Closed

@@ -113,7 +113,10 @@ def in_processes(
 def number(limit: float | None = None) -> int:
     """Processes that may work at the same time: none, or two at least.
 
-    Blender and they may take so many bytes together; by default as `set_memory_limit` was told.
+    Parameters
+    ----------
+    limit : float, optional
+        Bytes that Blender and they may take together; by default as `set_memory_limit` was told.
     """
     if _pool.stopped or _pool.broken or not _python():
         return 0
@@ -268,7 +271,10 @@ class _Child:
     def greet(self) -> bool:
         """Wait until it is there; whether it still is: it ends by itself when there is nothing to do.
 
-        A `_StartError` if it never was.
+        Raises
+        ------
+        _StartError
+            It never was.
         """
         if not self._ready:
             timer = threading.Timer(_PATIENCE, self.kill)
@@ -288,7 +294,10 @@ class _Child:
     def call(self, function: Callable, shared: _Given, item: object) -> tuple[str, object, str]:
         """What becomes of a call: "made" and the result, or "failed" and the error, with where it was.
 
-        `Closed` or an `OSError` if the process has ended.
+        Raises
+        ------
+        Closed, OSError
+            The process has ended.
         """
         self.forget()
         if shared.number not in self._known:
@@ -298,7 +307,13 @@ class _Child:
         return answer
 
     def forget(self) -> None:
-        """Let go of what no call will need again; `Closed` or an `OSError` if the process has ended."""
+        """Let go of what no call will need again.
+
+        Raises
+        ------
+        Closed, OSError
+            The process has ended.
+        """
         for number in [number for number, given in self._known.items() if given.forgotten]:
             del self._known[number]
             send(self._process.stdin, "forget", number)

@@ -82,9 +82,16 @@ def _read_leaf_year(reader: FileReader, data: Any, name: str) -> LeafYear:
 
 
 def species_from_dict(data: Any, identifier: str, source: str) -> Species:
-    """Check what `json.load` gave of a species file, and turn it into a `Species`.
+    """Check a decoded species file and turn it into a `Species`.
 
-    Plants refer to it by its identifier; errors name the source, usually the file's path.
+    Parameters
+    ----------
+    data : object
+        What `json.load` gave.
+    identifier : str
+        Name by which plants refer to the species.
+    source : str
+        Named in errors, usually the file's path.
 
     Raises
     ------
@@ -135,7 +142,13 @@ def species_from_dict(data: Any, identifier: str, source: str) -> Species:
 
 
 def species_from_json(content: bytes | str, identifier: str, source: str) -> Species:
-    """Check the text of a species file, as `species_from_dict` checks what it decodes to."""
+    """Check the text of a species file, as `species_from_dict` checks what it decodes to.
+
+    Raises
+    ------
+    SpeciesError
+        It is not JSON, or breaks a rule of the format.
+    """
     try:
         data = parse_json(content)
     except ValueError as error:
@@ -144,12 +157,24 @@ def species_from_json(content: bytes | str, identifier: str, source: str) -> Spe
 
 
 def read_species(path: Path) -> Species:
-    """Read and check one species file, as `species_from_dict` does."""
+    """Read and check one species file.
+
+    Raises
+    ------
+    SpeciesError
+        The file cannot be read, is not JSON, or breaks a rule of the format.
+    """
     return species_from_json(species_file(path), path.stem, path.name)
 
 
 def species_file(path: Path) -> bytes:
-    """The content of a species file; a `SpeciesError` if it cannot be read."""
+    """The content of a species file.
+
+    Raises
+    ------
+    SpeciesError
+        It cannot be read.
+    """
     try:
         return read_whole(path, MAX_FILE_BYTES)
     except OSError as error:
@@ -205,7 +230,13 @@ def stamp(path: Path) -> tuple[int, int]:
 
 
 def checked_identifier(text: str) -> str:
-    """An identifier of a species, which may have come from any file; a `SpeciesError` if it could name none."""
+    """An identifier of a species, which may have come from any file.
+
+    Raises
+    ------
+    SpeciesError
+        It could name no file of a species.
+    """
     if not is_identifier(text):
         raise SpeciesError(f"{quoted(text)} cannot name a species. Use only {IDENTIFIER_RULE}")
     return text
@@ -237,8 +268,11 @@ def in_order(found: Mapping[str, SpeciesInfo]) -> dict[str, SpeciesInfo]:
 def list_species(folders: Sequence[Path] = ()) -> dict[str, SpeciesInfo]:
     """All species by identifier, as `in_order` sorts them.
 
-    A file in a folder of the user's own replaces a shipped one of the same name, and one of a later folder. Missing
-    folders are passed over, and so are files that `odd_files` names.
+    Parameters
+    ----------
+    folders : sequence of Path
+        Folders of the user's own; a file there replaces a shipped one of the same name, and one of a later folder.
+        Missing folders are passed over, and so are files that `odd_files` names.
     """
     found: dict[str, SpeciesInfo] = {}
     for folder in (builtin_folder(), *reversed(folders)):
@@ -264,7 +298,14 @@ def _listed(folder: Path, _entries: tuple[tuple[str, int, int, int], ...]) -> di
 def load_species(
     identifier: str, folders: Sequence[Path] = (), known: Mapping[str, SpeciesInfo] | None = None
 ) -> Species:
-    """Read a species; unchanged files are read once. ``known`` is what `list_species` returned a moment ago.
+    """Read a species; unchanged files are read once.
+
+    Parameters
+    ----------
+    folders : sequence of Path
+        As of `list_species`.
+    known : mapping, optional
+        What `list_species` returned a moment ago.
 
     Raises
     ------

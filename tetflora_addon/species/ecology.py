@@ -20,9 +20,14 @@ _FULL = 0.75
 
 
 def crown_leaves(leaves: Floats | float, height: Floats, base: Floats, radius: Floats) -> Floats:
-    """One-sided leaf area (n,) of crowns, m², of heights, bases and radii (n,) in meters.
+    """One-sided leaf area (n,) of crowns, m².
 
-    ``leaves`` is `Ecology.leaves` of their species.
+    Parameters
+    ----------
+    leaves : (n,) float64 or float
+        `Ecology.leaves` of their species.
+    height, base, radius : (n,) float64
+        Of plants and their crowns, meters.
     """
     return np.pi * radius**2 * np.minimum((height - base) / (_FULL * height), 1.0) * leaves
 

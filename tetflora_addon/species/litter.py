@@ -76,7 +76,10 @@ def _needle(size: float) -> float:
 def litter_page(species: Species, page: Mapping[str, Any]) -> dict[str, Any] | None:
     """The page of a patch of fallen leaves, or of needles, twigs and cones; None of a species without leaves.
 
-    ``page`` is what its species file holds.
+    Parameters
+    ----------
+    page : mapping
+        What its species file holds.
     """
     bearing = [order for order in species.orders if order.leaves.mean > 0 and order.leaf_kind == LEAF_KINDS[0]]
     if not bearing:
@@ -238,7 +241,13 @@ def shed_share(species: Species) -> float:
 
 
 def leaves_page(species: Species, page: Mapping[str, Any]) -> dict[str, Any] | None:
-    """The page of a patch of leaves that fall in autumn; None of a species that sheds none. As of `litter_page`."""
+    """The page of a patch of leaves that fall in autumn; None of a species that sheds none.
+
+    Parameters
+    ----------
+    page : mapping
+        What its species file holds.
+    """
     made = litter_page(species, page) if shed_share(species) > 0.0 else None
     if made is None:
         return None

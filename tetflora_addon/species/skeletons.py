@@ -60,8 +60,14 @@ class Chains:
 def bezier_chains(control: Chains, left: Floats, right: Floats, steps: Integers) -> Chains:
     """Cubic Bezier splines; radii run evenly from one control point to the next.
 
-    ``left`` and ``right`` (p, 3) are handles before and after control points. Between two of these, splines have steps
-    (s,) pieces, 1 or more; 1 gives straight lines.
+    Parameters
+    ----------
+    control : Chains
+        Control points.
+    left, right : (p, 3) float64
+        Handles before and after each control point.
+    steps : (s,) int
+        Pieces between two control points of each spline, 1 or more; 1 gives straight lines.
     """
     counts = np.diff(control.first)
     owner = np.repeat(np.arange(len(counts)), counts)
@@ -106,10 +112,24 @@ def nurbs_chain(
 ) -> Chains:
     """One NURBS spline, by the recursion of Cox and de Boor (de Boor 1972).
 
-    Control points (n, 4) have weights (n,). The order is the degree and 1; at most n is used. Each span between two
-    knots has so many steps. Knots are as Blender places them: around, with the ends at the outer control points, in
-    pieces of Bezier splines; a spline that goes around has evenly spaced ones whatever else is asked for. Where there
-    are too few control points for the knots, they are the chain themselves.
+    Parameters
+    ----------
+    control : (n, 4) float64
+        Control points.
+    weights : (n,) float64
+        Their weights.
+    order : int
+        Degree and 1; at most n is used.
+    steps : int
+        Pieces of each span between two knots.
+    cyclic, endpoint, bezier : bool
+        As Blender places its knots: around, with the ends at the outer control points, in pieces of Bezier splines.
+        A spline that goes around has evenly spaced knots whatever else is asked for.
+
+    Returns
+    -------
+    Chains
+        The control points themselves where they are too few for the knots.
     """
     polygon = Chains(control, np.array([0, len(control)]), np.array([cyclic]))
     order = max(min(order, len(control)), 1)
@@ -146,10 +166,17 @@ def nurbs_chain(
 
 
 def joined_edges(chains: Chains) -> tuple[Floats, Integers, Integers]:
-    """One graph of chains: points (p, 4), edges (e, 2), and the chain (e,) of each edge.
+    """One graph of chains; those that begin on another are moved onto its line and joined to it there.
 
     A chain begins on another where its first point, or else its last, is nearer to the other's line than its radius
-    there, or than 1 % of the size of all. It is moved onto that line and joined to it there.
+    there, or than 1 % of the size of all.
+
+    Returns
+    -------
+    points : (p, 4) float64
+    edges : (e, 2) int64
+    line : (e,) int64
+        Chain of each edge.
     """
     points, edges = chains.points.copy(), chains.edges()
     owner = np.repeat(np.arange(len(chains.cyclic)), np.diff(chains.first))

@@ -147,10 +147,22 @@ EVEN = (np.arange(256) + 0.5) / 256
 
 
 def some_nodes(ends: ArrayLike, extra: float) -> tuple[Floats, Floats, Mask]:
-    """Places of children in nodes (512,), as many as stand for all; how many each stands for, 1 on the mean; and which
-    live for a while.
+    """Places of children in nodes, as many as stand for all.
 
-    ``ends`` (3,) are where nodes begin, where those begin that live for a while, and where all end.
+    Parameters
+    ----------
+    ends : (3,) float64
+        Where nodes begin, where those begin that live for a while, and where all end.
+    extra : float
+        As of `Nodes`.
+
+    Returns
+    -------
+    node : (512,) float64
+    weight : (512,) float64
+        How many children each stands for, 1 on the mean.
+    extra : (512,) bool
+        Whether they live for a while.
     """
     base, some, tip = ends
     weight = np.array([tip - base, extra * (tip - some)])
@@ -526,9 +538,14 @@ def whole_cuts(order: Order) -> list[float]:
 
 
 def crown_ratio(shape: Integers, r: Floats) -> Floats:
-    """Length ratios (...) of children, 0 to 1, at places r (...): 1 at the lowest child, 0 at the parent's tip.
+    """Length ratio of a child, 0 to 1.
 
-    ``shape`` (...) are indices into `CROWN_PROFILES`.
+    Parameters
+    ----------
+    shape : (...) int
+        Index into `CROWN_PROFILES`.
+    r : (...) float64
+        1 at the lowest child, 0 at the parent's tip.
 
     Notes
     -----

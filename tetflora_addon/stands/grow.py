@@ -235,8 +235,14 @@ _DEAD_DIAMETER = 0.4
 def grown(
     plants: Plants, crowns: Crowns, taken: NDArray, light: LightGrid, traits: StandTraits, block: slice
 ) -> Plants:
-    """Some plants, a block of all, a year later; their crowns are where they are, and ``taken`` is the light they take,
-    m².
+    """Some plants a year later.
+
+    Parameters
+    ----------
+    crowns, taken
+        Of these plants: where they are, and the light that they take, m².
+    block : slice
+        Of all plants.
     """
     one = plants.take(block)
     x, y, radius, base, height = (
@@ -354,9 +360,14 @@ _OUTSIDE = 0.1
 
 
 def planted(site: StandSite, traits: StandTraits, suitability: Floats, density: float, seed: int) -> Plants:
-    """Plants evenly spread, so many on a hectare, each somewhere in a square of its own.
+    """Plants evenly spread, each somewhere in a square of its own.
 
-    ``suitability`` (g, cells) is how well each species grows.
+    Parameters
+    ----------
+    suitability : (g, cells) float64
+        How well each species grows.
+    density : float
+        Plants on a hectare.
     """
     if density <= 0.0 or traits.planted.sum() <= 0.0:
         return Plants.empty()
@@ -396,7 +407,12 @@ class SeedDispersal:
     def __init__(self, site: StandSite, traits: StandTraits, suitability: Floats, most: float, outside: float) -> None:
         """Of a site, for species that grow so well on its cells.
 
-        So many plants come on a hectare and year at most; seeds from outside have a factor.
+        Parameters
+        ----------
+        most : float
+            Plants that come on a hectare and year at most.
+        outside : float
+            Factor on the seeds from outside.
         """
         self.site, self.traits, self.suitability, self.most = site, traits, suitability, most
         width, depth = site.size

@@ -79,9 +79,8 @@ def barycentric_gradients(vertices: Floats) -> Floats:
 
 
 def barycentric(vertices: Floats, points: Floats) -> Floats:
-    """Coordinates λ ``(..., 4)``, Σ λ = 1 and Σ λ_i v_i = point, of points ``(..., 3)`` in tetrahedra ``(..., 4, 3)``.
-
-    Each point has one; leading axes broadcast.
+    """Coordinates λ ``(..., 4)``, Σ λ = 1 and Σ λ_i v_i = point, of points ``(..., 3)`` in a tetrahedron ``(..., 4, 3)``
+    each; leading axes broadcast.
     """
     gradients = barycentric_gradients(vertices)[..., 1:, :]
     rest = np.sum(gradients * (points - vertices[..., 0, :])[..., None, :], axis=-1)
