@@ -583,6 +583,8 @@ def totals_of_day(
     Parameters
     ----------
     rows : (r,) parameter table
+    species : sequence of Species
+    season : seasons.Season
     totals : Averages
         Of the same rows.
     leaf : RowLeaves

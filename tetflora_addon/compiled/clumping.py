@@ -265,6 +265,7 @@ def elements_of(
 
     Parameters
     ----------
+    rows : parameter table
     forms : by kind
         Models of leaves of the species.
     subplants : Branches of one species

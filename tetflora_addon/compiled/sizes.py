@@ -256,6 +256,7 @@ def fitted(flora: Flora, seeds: Seeds, height: Floats, width: Floats, times: int
 
     Parameters
     ----------
+    flora : Flora
     seeds : Seeds of n
     height, width : (n,) float64
         Meters.

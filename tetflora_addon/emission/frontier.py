@@ -185,6 +185,8 @@ class Frontier:
 
     Parameters
     ----------
+    kinds : sequence of FrontierKind
+    coverage : Coverage
     facet : float
         Side of facets, pixels; it and the kinds may change on the way to what is coarser.
 

@@ -78,6 +78,7 @@ def leaf_sites(
 
     Parameters
     ----------
+    rows : parameter table
     branches, lines : Branches of n and their Axes
     row : (m,) or (1,) int
     owner : (m,) int
@@ -253,6 +254,7 @@ def place_leaves(
 
     Parameters
     ----------
+    rows : parameter table
     branches, lines : Branches of n and their Axes
         Fastest where all are of one row, because parameters are then the same for all.
     owner, index : (m,) int
@@ -294,6 +296,7 @@ def leaf_frames(
 
     Parameters
     ----------
+    rows : parameter table
     row : (m,) or (1,) int
     frame : (m, 3, 3) float32
         Of the branch where each leaf sits.
@@ -379,6 +382,7 @@ def settled(rows: Table, row: Integers, frame: NDArray[np.floating], light: Floa
 
     Parameters
     ----------
+    rows : parameter table
     row : (n,) or (1,) int
     frame, light, sky
         As for `face_light`.

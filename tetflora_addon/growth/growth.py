@@ -210,6 +210,7 @@ def chosen_children(
 
     Parameters
     ----------
+    rows : parameter table
     parents : Branches of n
     lines : Axes of the same n
     owner : (m,) int

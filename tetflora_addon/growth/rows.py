@@ -62,6 +62,7 @@ def grow_children(
     ----------
     row : record of `rows.ROW_DTYPE`
         Its count is that of the whole axis, of which it is one part.
+    sort : int
     nodes : Nodes
         Of the whole axis.
     start : pair of float
@@ -251,6 +252,7 @@ def grown_nodes(
 
     Parameters
     ----------
+    rows : parameter table
     branches : Branches of n
     sort, path : int
         Of children, and where their child indices begin.
@@ -678,6 +680,7 @@ def ranged(rows: Table, name: str, row: Integers, key: Keys, draw: int) -> NDArr
 
     Parameters
     ----------
+    rows : table of `build_rows`
     name : str
         A range of `ROW_DTYPE`.
     row : (n,) int

@@ -159,6 +159,7 @@ def plant_years(rows: Table, row: Integers, key: Keys) -> Floats | None:
 
     Parameters
     ----------
+    rows : parameter table
     row : (n,) int
         Of their trunks.
     key : (n,) uint64

@@ -302,6 +302,7 @@ def rounded(model: LeafModel, times: int) -> tuple[LeafModel, float]:
 
     Parameters
     ----------
+    model : LeafModel
     times : int
         Each makes four faces of a triangle.
 
@@ -423,6 +424,8 @@ def spined(model: LeafModel, spines: Spines, part: Integers) -> tuple[LeafModel,
 
     Parameters
     ----------
+    model : LeafModel
+    spines : Spines
     part : (f,) int64
         Its `bodies.closed_parts`, on which spines stand.
 

@@ -339,6 +339,7 @@ def blade_surface(blade: Blade, tolerance: float, amount: float = 1.0) -> LeafSu
 
     Parameters
     ----------
+    blade : Blade
     tolerance : float
         Of the outline, in lengths of the blade.
     amount : float

@@ -196,6 +196,7 @@ class Illumination:
         ----------
         points, color, transmission, cells
             As for `facet_radiance`.
+        camera : Camera
         normal : (m, 3) float64
             Axis of the plane term; both ways are alike.
         plane : (m,) float64
@@ -352,6 +353,8 @@ def shadow_steps(
     ----------
     clouds : MediumCells
         All tetrahedra that hold something.
+    lights : sequence of Light
+    world : World
     occluders : (t, 3, 3) float64, optional
         Triangles of opaque polygons, meters.
     resolution : int

@@ -49,6 +49,7 @@ class Packed:
 
     Parameters
     ----------
+    thing : object
     known : callable, optional
         Number of an object within it that is sent apart; None for all others.
     """

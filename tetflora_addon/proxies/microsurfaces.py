@@ -90,6 +90,7 @@ def subplant_facets(
 
     Parameters
     ----------
+    flora : Flora
     subplants : Branches of n
     leaf_side, wood_side : (n,) float64
         Side of a facet for leaves and for wood (the same if not given), meters; facets for leaves are never smaller
@@ -99,6 +100,7 @@ def subplant_facets(
     explicit : (n,) float64, optional
         Fraction of each sub-plant that is drawn as it is; as many of its facets are left out at random.
     lit : LightRatios of n, optional
+    thin : Thin, optional
     """
     part = np.ones(len(subplants)) if weight is None else weight
     wood_side = leaf_side if wood_side is None else wood_side

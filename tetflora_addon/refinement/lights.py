@@ -74,6 +74,7 @@ def light_views(light: Light, vertices: Floats, points: Floats, resolution: int)
 
     Parameters
     ----------
+    light : Light
     vertices : (n, 4, 3) float64
         Tetrahedra that stand in the light, meters.
     points : (m, 3) float64

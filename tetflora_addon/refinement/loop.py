@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The main loop: visibility, refinement, update, until the image gains nothing more (paper, section 6.2).
+"""The main loop: visibility, refinement, update, until the image gains nothing more (paper, section 6.2); and statistics.
 
 A pass costs what it changes: only divided tetrahedra give their contents away, only new ones are drawn and summed up.
 
@@ -313,6 +313,8 @@ def refine(
         Compiled species, in the order of ``seeds.identifiers``.
     seeds : Seeds
         At least one plant, or none where there are polygons or assets.
+    camera : Camera
+    settings : RefinementSettings
     occluders : (t, 3, 3) float64, optional
         Triangles of explicit polygons that hide what is behind them, meters.
     polygons : Polygons, optional

@@ -69,6 +69,7 @@ def tetrahedron_fragments(vertices: Floats, camera: Camera, width: int, height: 
     ----------
     vertices : (n, 4, 3) float64
         Positively oriented tetrahedra, meters, world space. They may hold the eye or cross its plane.
+    camera : Camera
     width, height : int
         Size of the small image, pixels.
 

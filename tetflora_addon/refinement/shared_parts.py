@@ -122,6 +122,7 @@ class SharedParts(Generic[Parts]):
 
     Parameters
     ----------
+    camera : Camera
     filled : bool
         Whether proxies fill their tetrahedra, so that small ones without points would be holes.
     """
@@ -180,6 +181,7 @@ class SharedParts(Generic[Parts]):
 
         Parameters
         ----------
+        tree : TetrahedralTree
         dividing : (nodes,) bool
             Nodes that have been divided.
         edge : (nodes,) float64
@@ -283,6 +285,7 @@ def share_points(
 
     Parameters
     ----------
+    flora : Flora
     parts : PlantParts of n
         Sub-plants, or if ``lines`` are given branches alone.
     pixels : (n,) float64

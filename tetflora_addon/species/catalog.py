@@ -302,6 +302,7 @@ def load_species(
 
     Parameters
     ----------
+    identifier : str
     folders : sequence of Path
         As of `list_species`.
     known : mapping, optional

@@ -78,6 +78,7 @@ def litter_page(species: Species, page: Mapping[str, Any]) -> dict[str, Any] | N
 
     Parameters
     ----------
+    species : Species
     page : mapping
         What its species file holds.
     """
@@ -245,6 +246,7 @@ def leaves_page(species: Species, page: Mapping[str, Any]) -> dict[str, Any] | N
 
     Parameters
     ----------
+    species : Species
     page : mapping
         What its species file holds.
     """

@@ -46,6 +46,7 @@ class LeafCopies:
 
     Parameters
     ----------
+    model : LeafModel
     number : int
         Of copies in the end, at most.
     transmission : float
@@ -157,6 +158,7 @@ class KiteCopies(LeafCopies):
 
     Parameters
     ----------
+    kites : LeafKites
     number, transmission, moving
         As of `LeafCopies`.
     """
@@ -188,6 +190,7 @@ class LevelCopies(LeafCopies):
 
     Parameters
     ----------
+    level : LeafLevel
     number, transmission, moving
         As of `LeafCopies`.
     """
@@ -283,13 +286,16 @@ def leaf_meshes(
 
     Parameters
     ----------
+    flora : Flora
     species : int
         Index into the flora's species.
+    whole : sequence of WholeBranches
     fractions_of : callable, optional
         Fractions (n,), (n,), (n,) of the leaves of branches that are wanted, and of these that are kites, and kites or
         a kite for each plane; the leaves' own random numbers decide which.
     lengths_of : callable, optional
         Lengths (n,) of the leaves of branches in the image, in errors that do not show; those of long ones are finer.
+    thin : Thin, optional
     """
     groups = [group for some in whole for group in _bearers(flora, some)]
     if fractions_of is not None:

@@ -55,6 +55,8 @@ def tube_buffers(
 
     Parameters
     ----------
+    flora : Flora
+    whole : sequence of WholeBranches
     pixels : Pixels, optional
         How large they are; near branches are rounder then, and bent, and have feet.
     most_sides : int, optional
@@ -281,6 +283,7 @@ def twig_buffers(flora: Flora, whole: WholeBranches, wider: Floats, parts: Integ
 
     Parameters
     ----------
+    flora : Flora
     whole : WholeBranches of n
         Of any rows.
     wider : (n,) float64

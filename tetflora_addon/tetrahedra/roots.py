@@ -246,9 +246,21 @@ SMALLEST = 1.0
 
 
 def world_cubes(bounds: ArrayLike) -> tuple[float, Integers, Integers]:
-    """Cubes around a scene: side in meters, a power of two; lowest corner (3,) in sides; number (3,) along each axis.
+    """Cubes around a scene, at most two along each axis.
 
-    ``bounds`` (2, 3) are the lowest and the highest corner of what is in the scene, meters. Numbers are 1 or 2.
+    Parameters
+    ----------
+    bounds : (2, 3) float64
+        Lowest and highest corner of what is in the scene, meters.
+
+    Returns
+    -------
+    side : float
+        Meters, a power of two.
+    low : (3,) int64
+        Lowest corner, in sides.
+    number : (3,) int64
+        Cubes along each axis, 1 or 2.
 
     Raises
     ------
@@ -266,10 +278,20 @@ def world_cubes(bounds: ArrayLike) -> tuple[float, Integers, Integers]:
 
 
 def world_root(bounds: ArrayLike, origin: ArrayLike = (0.0, 0.0, 0.0)) -> TetrahedralTree:
-    """Tree whose terminals are Kuhn's tetrahedra of the cubes around a scene, of bounds as of `world_cubes`.
+    """Tree whose terminals are Kuhn's tetrahedra of the cubes around a scene.
 
-    ``origin`` (3,) is where in the world coordinates begin, whole meters: cubes are those of the world. The eye may be
-    anywhere: what is outside all cubes has an order too. No terminal is marked `inside`, as nothing follows a camera.
+    Parameters
+    ----------
+    bounds : (2, 3) float64
+        Lowest and highest corner of what is in the scene, meters. The eye may be anywhere: what is outside all cubes
+        has an order too.
+    origin : (3,) float64
+        Where in the world coordinates begin, whole meters: cubes are those of the world.
+
+    Returns
+    -------
+    TetrahedralTree
+        No terminal is marked `inside`, as nothing of it follows a camera.
 
     Raises
     ------

@@ -28,23 +28,37 @@ TIE = 1e-9
 
 
 def longest_edge(vertices: Floats) -> Integers:
-    """Index ``(n,)`` into `geometry.EDGES` of the longest edge of tetrahedra ``(n, 4, 3)``; the first of equally long
-    ones.
+    """Index into `geometry.EDGES` of the longest edge; the first of those that are equally long.
+
+    Parameters
+    ----------
+    vertices : (n, 4, 3) float64
+        Tetrahedra, meters.
+
+    Returns
+    -------
+    (n,) intp
     """
     squared = squared_edges(vertices)
     return np.argmax(squared >= np.max(squared, axis=1, keepdims=True) * (1.0 - TIE), axis=1)
 
 
 def bisect(vertices: Floats) -> tuple[Floats, Floats]:
-    """Cut positively oriented tetrahedra ``(n, 4, 3)`` in two at the midpoint of their longest edges.
+    """Cut tetrahedra in two at the midpoint of their longest edges.
+
+    Parameters
+    ----------
+    vertices : (n, 4, 3) float64
+        Positively oriented tetrahedra, meters.
 
     Returns
     -------
     planes : (n, 4) float64
+        Cutting planes ``(nx, ny, nz, d)``, unit normals.
     children : (n, 2, 4, 3) float64
         Child 0 on the negative side of the plane, child 1 on the positive one; positively oriented, half the volume
-        each. A child keeps its parent's vertices in their places but for the midpoint, so that what both share has the
-        same coordinates to the last bit.
+        each. A child keeps its parent's vertices in their places but for the midpoint, so that what both share has
+        the same coordinates to the last bit.
     """
     every = np.arange(len(vertices))
     edge = longest_edge(vertices)
@@ -95,18 +109,27 @@ _CHILDREN, _PLANES = _tables()
 
 
 def best_diagonal(vertices: Floats) -> Integers:
-    """Diagonal ``(n,)`` along which the worst inner part of tetrahedra ``(n, 4, 3)`` has the best quality.
+    """Diagonal along which the worst of the inner tetrahedra has the best quality.
 
-    Diagonal ``k`` joins the middles of edges ``k`` and ``5 - k`` of `geometry.EDGES`; the first of those equally good.
+    Parameters
+    ----------
+    vertices : (n, 4, 3) float64
+        Tetrahedra, meters.
+
+    Returns
+    -------
+    (n,) intp
+        Diagonal ``k`` joins the middles of edges ``k`` and ``5 - k`` of `geometry.EDGES`; the first of those that are
+        equally good.
 
     Notes
     -----
     All children have the same volume. Let S be the sum of the squared edges, D² the squared diagonal, and p and q the
-    squares of the edges whose middles it joins. Two of the inner tetrahedra have edges of (S − p + 4 D²) / 4, two of (S
-    − q + 4 D²) / 4, where 4 D² = S − 2 (p + q). The three 4 D² add up to S, so that of the shortest diagonal is S / 3
-    at most, and one division keeps more than three quarters of the quality. But for min(p, q), the shortest diagonal is
-    the best. On choices of the diagonal: S. Zhang, "Successive subdivisions of tetrahedra and multigrid methods on
-    tetrahedral meshes", Houston Journal of Mathematics 21 (1995).
+    squares of the edges whose middles it joins. Two of the inner tetrahedra have edges of (S − p + 4 D²) / 4, two of
+    (S − q + 4 D²) / 4, where 4 D² = S − 2 (p + q). The three 4 D² add up to S, so that of the shortest diagonal is
+    S / 3 at most, and one division keeps more than three quarters of the quality. But for min(p, q), the shortest
+    diagonal is the best. On choices of the diagonal: S. Zhang, "Successive subdivisions of tetrahedra and multigrid
+    methods on tetrahedral meshes", Houston Journal of Mathematics 21 (1995).
     """
     squared = squared_edges(vertices)
     p, q = squared[:, :3], squared[:, :2:-1]
@@ -115,14 +138,20 @@ def best_diagonal(vertices: Floats) -> Integers:
 
 
 def divide_in_eight(vertices: Floats, diagonal: Integers | None = None) -> tuple[Floats, Floats]:
-    """Divide positively oriented tetrahedra ``(n, 4, 3)`` into eight of the same volume.
+    """Divide tetrahedra into eight of the same volume.
 
-    A diagonal ``(n,)`` of the inner octahedron is cut along, by default the `best_diagonal`.
+    Parameters
+    ----------
+    vertices : (n, 4, 3) float64
+        Positively oriented tetrahedra, meters.
+    diagonal : (n,) int, optional
+        Which diagonal of the inner octahedron to cut along; `best_diagonal` if None.
 
     Returns
     -------
     planes : (n, 7, 4) float64
-        In the order of a heap: plane ``i`` is followed by plane ``2 i + 1`` on side 0, by plane ``2 i + 2`` on side 1.
+        Cutting planes ``(nx, ny, nz, d)``, unit normals, in the order of a heap: plane ``i`` is followed by plane
+        ``2 i + 1`` on side 0 and by plane ``2 i + 2`` on side 1.
     children : (n, 8, 4, 3) float64
         Positively oriented; child ``4 s + 2 t + u`` lies on sides ``s``, ``t`` and ``u`` of the three planes that lead
         to it. Even ones are the corners.
@@ -136,11 +165,24 @@ def divide_in_eight(vertices: Floats, diagonal: Integers | None = None) -> tuple
 
 
 def divide_by_shape(vertices: Floats) -> tuple[Floats, Floats, Mask]:
-    """Divide tetrahedra ``(n, 4, 3)`` into eight in the way that keeps them in better shape, so that no slivers arise.
+    """Divide tetrahedra into eight in the way that keeps them in better shape, so that no slivers arise.
 
-    Both ways give eight of equal volume, three planes deep, as `divide_in_eight` returns them. Worst qualities are
-    compared, with a `HANDICAP` on the bisection of compact tetrahedra. The mask ``(n,)`` tells those that were divided
-    into the canonical eight; the others were bisected three times.
+    Both ways give eight of equal volume, three planes deep. Worst qualities are compared, with a `HANDICAP` on the
+    bisection of compact tetrahedra.
+
+    Parameters
+    ----------
+    vertices : (n, 4, 3) float64
+        Positively oriented tetrahedra, meters.
+
+    Returns
+    -------
+    planes : (n, 7, 4) float64
+        In the order of a heap, see `divide_in_eight`.
+    children : (n, 8, 4, 3) float64
+        Positively oriented, of equal volume.
+    eight : (n,) bool
+        Which were divided into the canonical eight; the others were bisected three times along their longest edges.
 
     Notes
     -----
@@ -275,9 +317,17 @@ class TetrahedralTree:
         return children
 
     def split_by_shape(self, nodes: ArrayLike) -> Integers32:
-        """Terminals ``(n, 8)``, three levels further down, of terminal tetrahedra ``(n,)``, see `divide_by_shape`.
+        """Divide terminal tetrahedra into eight as suits their shape: the canonical eight, or three bisections.
 
-        They inherit `inside`.
+        Parameters
+        ----------
+        nodes : (n,) int
+            Terminal nodes with a tetrahedron, each once.
+
+        Returns
+        -------
+        (n, 8) int32
+            Terminals three levels further down, see `tree.divide_by_shape`; they inherit `inside`.
 
         Raises
         ------
@@ -292,9 +342,19 @@ class TetrahedralTree:
         return nodes.reshape(-1, 8)
 
     def divide(self, nodes: ArrayLike, planes: ArrayLike) -> Integers32:
-        """Children ``(n, 2)``, on sides 0 and 1, of terminal nodes ``(n,)`` divided by planes ``(n, 4)``.
+        """Divide terminal nodes by given planes; the children have no tetrahedra until `place` gives them some.
 
-        They inherit `inside`, and have no tetrahedra until `place` gives them some.
+        Parameters
+        ----------
+        nodes : (n,) int
+            Terminal nodes, each once.
+        planes : (n, 4) float64
+            Cutting planes ``(nx, ny, nz, d)``, unit normals.
+
+        Returns
+        -------
+        (n, 2) int32
+            The children on sides 0 and 1; they inherit `inside`.
 
         Raises
         ------
@@ -373,9 +433,17 @@ class TetrahedralTree:
         return place
 
     def locate(self, points: ArrayLike) -> Integers32:
-        """Terminals ``(n,)`` that hold points ``(n, 3)``, meters. A point on a plane belongs to side 1.
+        """Terminal that holds each point; points outside the root go to the one on their side of all planes.
 
-        Points outside the root go to the one on their side of all planes.
+        Parameters
+        ----------
+        points : (n, 3) float64
+            Meters, world space.
+
+        Returns
+        -------
+        (n,) int32
+            Node numbers. A point on a plane belongs to side 1.
         """
         points = np.asarray(points, np.float64).reshape(-1, 3)
         found = np.zeros(len(points), np.int32)
