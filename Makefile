@@ -14,6 +14,10 @@ LTS_VERSIONS = 3.11
 export PYTHON
 # Two cores and a process each: threads of products of matrices would only wait for one another.
 export OPENBLAS_NUM_THREADS = 1
+# What Python compiles, asserts of tests among it, is kept, wherever that is forbidden beside the sources: collecting took
+# 14 s of each process of a run, and takes 4; tests start many others.
+unexport PYTHONDONTWRITEBYTECODE
+export PYTHONPYCACHEPREFIX = $(CURDIR)/out/pycache
 
 .PHONY: help environment demo results test quick test-lts lint build bench docs-images clean
 .DEFAULT_GOAL := help

@@ -43,8 +43,7 @@ from tetflora_addon.emission.plants import expanded_blocks
 from tetflora_addon.growth.seeds import Seeds
 from tetflora_addon.jobs import Progress
 from tetflora_addon.refinement.decisions import Decision
-from tetflora_addon.refinement.loop import Refinement
-from tetflora_addon.refinement.statistics import Statistics
+from tetflora_addon.refinement.loop import Refinement, Statistics
 from tetflora_addon.species import catalog
 
 from .pictures import timed_render

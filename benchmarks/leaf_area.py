@@ -28,8 +28,7 @@ from tetflora_addon.growth.growth import trunks
 from tetflora_addon.growth.seeds import Seeds
 from tetflora_addon.species.catalog import load_species
 from tetflora_addon.species.ecology import ecology_of, one_sided
-from tetflora_addon.stands.change import Plants
-from tetflora_addon.stands.grow import StandSettings, begun
+from tetflora_addon.stands.grow import Plants, StandSettings, begun
 from tetflora_addon.stands.site import StandSite, StandSpecies, StandTraits
 
 from .pictures import coverage

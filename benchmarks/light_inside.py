@@ -34,8 +34,7 @@ from tetflora_addon.blender.placing.first_forest import sky
 from tetflora_addon.blender.results.output import result_collections
 from tetflora_addon.blender.scene.fields import OFFSET, SIZE_ATTRIBUTES, write_field
 from tetflora_addon.species.catalog import load_species
-from tetflora_addon.stands.change import Records
-from tetflora_addon.stands.grow import StandSettings, begun
+from tetflora_addon.stands.grow import Records, StandSettings, begun
 from tetflora_addon.stands.site import StandSite, StandSpecies, StandTraits
 
 from .pictures import read_picture, render, timed_refine

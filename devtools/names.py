@@ -87,12 +87,12 @@ def file_keys() -> dict[str, list[str]]:
     from tetflora_addon.blender.placing.properties import TetFloraLayer
     from tetflora_addon.blender.placing.rules import ENTRY
     from tetflora_addon.parameters import keys_of
-    from tetflora_addon.species import growing, schema, species
+    from tetflora_addon.species import catalog, species
 
-    parts = (species.Bud, species.Dead, species.Year, species.LeafYear, growing.Ages, species.Ecology)
+    parts = (species.Bud, species.Dead, species.Year, species.LeafYear, species.Ages, species.Ecology)
     return {
-        "species": list(schema.SPECIES_KEYS),
-        "species: orders, spur": list(schema.ORDER_KEYS),
+        "species": list(catalog.SPECIES_KEYS),
+        "species: orders, spur": list(catalog.ORDER_KEYS),
         **{f"species: {kind.__name__}": list(keys_of(kind)) for kind in parts},
         "biome": sorted(files._KEYS | files._MORE),
         "biome: ground": list(GROUND),

@@ -14,8 +14,7 @@ import re
 
 from tetflora_addon.leaves.models import LEAF_MODELS, OUTLINES, Spines
 from tetflora_addon.parameters import Key, keys_of
-from tetflora_addon.species.catalog import builtin_folder, load_species
-from tetflora_addon.species.schema import LENGTH_HIGH, ORDER_KEYS
+from tetflora_addon.species.catalog import LENGTH_HIGH, ORDER_KEYS, builtin_folder, load_species
 from tetflora_addon.species.species import CROWN_PROFILES, DAYS, LEAF_KINDS
 
 from . import forms

@@ -40,7 +40,7 @@ LIMIT_GB = 20.0
 MANIFEST = "blender_manifest.toml"
 #: What Blender excludes from an extension by default.
 _LEFT_OUT = ("__pycache__/", ".*", "/*.zip")
-#: Species files are no larger, see `species.schema`.
+#: Species files are no larger, see `species.catalog`.
 _LARGEST_SPECIES = 4_000_000
 #: Of all files in the zip, so that equal files give equal zips.
 _DATE = (1980, 1, 1, 0, 0, 0)

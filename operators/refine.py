@@ -22,7 +22,7 @@ from ..tetflora_addon.blender.viewport.warnings import cut_off
 from ..tetflora_addon.errors import TetFloraError
 from ..tetflora_addon.jobs import Job
 from ..tetflora_addon.preview.levels import Levels
-from ..tetflora_addon.refinement.statistics import Statistics
+from ..tetflora_addon.refinement.loop import Statistics
 from .base import (
     NO_CAMERA,
     ModalJob,

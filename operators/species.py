@@ -26,7 +26,7 @@ from ..tetflora_addon.blender.species.edits import (
     species_data,
     store_species,
 )
-from ..tetflora_addon.species.schema import DEFAULT_SPUR
+from ..tetflora_addon.species.catalog import DEFAULT_SPUR
 from ..tetflora_addon.species.skeletons import MAX_ORDERS
 from .base import FileTool, Reporting, counted, need, selected_plants
 

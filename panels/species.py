@@ -15,7 +15,7 @@ from ..tetflora_addon.blender.species.editor import (
 )
 from ..tetflora_addon.blender.species.edits import find_edit, problem_of, skipped_files
 from ..tetflora_addon.blender.viewport import species
-from ..tetflora_addon.species.schema import ORDER_KEYS
+from ..tetflora_addon.species.catalog import ORDER_KEYS
 from ..tetflora_addon.species.species import LEAF_KINDS
 from .base import Button, SidebarPanel, draw_buttons, draw_message, draw_numbers, draw_properties, section, split_layout
 

@@ -19,7 +19,7 @@ from tests.attack import material
 from tests.attack.watch import Case, Jail
 from tests.engine import support
 from tetflora_addon import files, storage
-from tetflora_addon.assets.mesh_features import mesh_features
+from tetflora_addon.assets.patches import mesh_features
 from tetflora_addon.compiled.flora import compile_species
 from tetflora_addon.emission.polygons import kept_polygons, polygon_blocks
 from tetflora_addon.errors import TetFloraError
@@ -28,8 +28,14 @@ from tetflora_addon.parameters import Key
 from tetflora_addon.refinement.loop import Refinement, refine
 from tetflora_addon.refinement.polygons import Meshes, Polygons, Surface
 from tetflora_addon.refinement.settings import RefinementSettings
-from tetflora_addon.species.catalog import list_species, load_species, odd_files
-from tetflora_addon.species.schema import ORDER_KEYS, read_species, species_from_dict
+from tetflora_addon.species.catalog import (
+    ORDER_KEYS,
+    list_species,
+    load_species,
+    odd_files,
+    read_species,
+    species_from_dict,
+)
 
 _SETTINGS = RefinementSettings(visibility_resolution=64, max_tetrahedra=4_000)
 _FILES = (support.SMALL, support.RICH, *(support.shipped(name) for name in ("grass", "palm", "fern")))

@@ -23,14 +23,13 @@ from tetflora_addon.growth.growth import trunks
 from tetflora_addon.growth.seasons import Season
 from tetflora_addon.growth.seeds import crown_shapes
 from tetflora_addon.growth.wind import Wind
-from tetflora_addon.leaves.kites import leaf_kites
-from tetflora_addon.leaves.levels import leaf_levels
+from tetflora_addon.leaves.levels import leaf_kites, leaf_levels
 from tetflora_addon.leaves.models import LEAF_MODELS
 from tetflora_addon.refinement.contents import bounding_capsules, subplant_totals
 from tetflora_addon.species.ages import with_age
+from tetflora_addon.species.catalog import species_from_dict
 from tetflora_addon.species.litter import leaves_page, litter_page
 from tetflora_addon.species.quality import with_quality
-from tetflora_addon.species.schema import species_from_dict
 from tetflora_addon.species.species import LEAF_ENVELOPES, Species
 from tetflora_addon.subplants.leaf_meshes import leaf_meshes
 from tetflora_addon.subplants.pieces import expand

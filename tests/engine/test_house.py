@@ -8,7 +8,6 @@ import ast
 import subprocess
 import sys
 from collections.abc import Iterator
-from functools import cache
 from pathlib import Path
 
 import pytest
@@ -28,14 +27,9 @@ def _name(path: Path) -> str:
     return path.relative_to(ROOT).as_posix()
 
 
-@cache
-def _tree(path: Path) -> ast.Module:
-    return ast.parse(path.read_text(encoding="utf-8"))
-
-
 def _imports(path: Path) -> Iterator[tuple[int, str]]:
     """Level (0: absolute) and dotted name of everything that a file imports, anywhere in it."""
-    for node in ast.walk(_tree(path)):
+    for node in ast.walk(rooms.tree(path)):
         if isinstance(node, ast.Import):
             yield from ((0, alias.name) for alias in node.names)
         elif isinstance(node, ast.ImportFrom):
@@ -65,7 +59,7 @@ def test_engine_imports_numpy_and_the_standard_library_only() -> None:
 
 
 def test_every_file_says_what_it_is_for() -> None:
-    assert [_name(path) for path in EXTENSION if not ast.get_docstring(_tree(path))] == []
+    assert [_name(path) for path in EXTENSION if not ast.get_docstring(rooms.tree(path))] == []
 
 
 def test_no_arrow_is_allowed_without_need() -> None:
@@ -153,7 +147,7 @@ def test_versions_are_compared_in_one_place() -> None:
     found = [
         f"{_name(path)}:{node.lineno}"
         for path in EXTENSION
-        for node in ast.walk(_tree(path))
+        for node in ast.walk(rooms.tree(path))
         if isinstance(node, ast.Attribute)
         and node.attr in {"version", "version_string", "version_file"}
         and isinstance(node.value, ast.Attribute)

@@ -79,7 +79,7 @@ def test_with_another_language_clock_and_letters(tmp_path: Path) -> None:
 def test_texts_are_utf_8_and_nothing_forks_or_asks_for_the_language() -> None:
     """Else Windows would take its own code page; binary files have none."""
     for path in rooms.sources().values():
-        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        for node in ast.walk(rooms.tree(path)):
             names = [alias.name for alias in node.names] if isinstance(node, ast.Import) else []
             names += [node.module or ""] if isinstance(node, ast.ImportFrom) and not node.level else []
             assert not {"multiprocessing", "locale"} & {name.split(".")[0] for name in names}, path

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from examples import rami, rami_discs, rami_species
-from tetflora_addon.species.schema import species_from_dict
+from tetflora_addon.species.catalog import species_from_dict
 
 SOLID = rami_discs.Solid("sphere", 1.0, 2.0, 2000, 0.05)
 

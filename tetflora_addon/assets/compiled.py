@@ -18,7 +18,7 @@ from typing import Self
 import numpy as np
 
 from ..arrays import Floats, Integers, perpendicular, unit
-from ..compiled.rays import basis, covered
+from ..compiled.clumping import basis, covered
 from ..errors import TetFloraError
 from ..growth.hashing import child_key, key_of_seed, uniform
 from .asset import COUNTS, Asset, AssetKites, AssetSource, Clusters, SurfaceSamples

@@ -3,7 +3,7 @@
 """Triangles of an asset in the order of its clusters, looked at in runs: areas, bounds, orientation and samples.
 
 A run is of whole clusters without children. What it takes does not grow with the asset.
-Leaves are kites as well, which are drawn for a leaf of very few pixels, as for those of species (`leaves.kites`).
+Leaves are kites as well, which are drawn for a leaf of very few pixels, as for those of species (`leaves.levels`).
 """
 
 from collections.abc import Iterator

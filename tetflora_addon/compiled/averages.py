@@ -34,14 +34,12 @@ from ..growth.crown_effects import (
     trunk_length_factors,
 )
 from ..growth.foliage import YOUTH
-from ..growth.grown_rows import NOW, fullness_of, lengths, living, spread_children
-from ..growth.rows import DEAD, FORK, LATERAL, SPUR
+from ..growth.rows import DEAD, FORK, LATERAL, NOW, SPUR, fullness_of, lengths, living, spread_children
 from ..growth.seeds import BASE, LEAVES, MOST, WIDTH, Branches
 from ..leaves.levels import hidden_gloss
 from ..leaves.models import LeafModel
-from ..species.growing import EVEN
 from ..species.members import dead_vigor, expected_forks
-from ..species.species import LEAF_KINDS, Range, Species
+from ..species.species import EVEN, LEAF_KINDS, Range, Species
 
 NODES = np.array([0.0, 0.5, 1.0])
 _GAUSS, _WEIGHTS = (part / 2 for part in np.polynomial.legendre.leggauss(8))

@@ -14,8 +14,7 @@ from numpy.typing import NDArray
 
 from ..arrays import Floats, Table
 from ..growth.foliage import envelope_reach
-from ..growth.grown_rows import NOW
-from ..growth.rows import DEAD, FORK, LATERAL, SPUR
+from ..growth.rows import DEAD, FORK, LATERAL, NOW, SPUR
 from ..growth.wind import widest_sway
 from ..species.species import crown_ratio
 from .samples import LIMB, Points

@@ -28,9 +28,8 @@ from ..growth.growth import radius_at, trunks
 from ..growth.seeds import LEAVES, PLAIN, THICKNESS, Seeds, crown_shapes
 from ..species.ages import BARE, NARROWER, ages_of, with_age, with_habit
 from ..species.ecology import crown_leaves, ecology_of, one_sided
-from ..species.growing import Ages
 from ..species.kinds import MOST_YEARS, Kind
-from ..species.species import Species
+from ..species.species import Ages, Species
 from .flora import compile_species
 from .sizes import fitted, measured
 

@@ -31,17 +31,15 @@ from ..arrays import (
 from ..growth.axes import Axes, axes
 from ..growth.crown_effects import MOST_LEANING, are_stools, bare_part, child_factors, lateral_fractions, length_factors
 from ..growth.foliage import envelope_reach, leaf_keys, leaf_places, place_leaves, settled
-from ..growth.grown_rows import FADES, lengths
 from ..growth.growth import branch_counts, chosen_children, leaf_counts, living_nodes, open_branches, trunks
 from ..growth.hashing import Draw, uniform
-from ..growth.rows import FORK, LATERAL
+from ..growth.rows import FADES, FORK, LATERAL, lengths
 from ..growth.seeds import BASE, LEAST, MOST, PLAIN, WIDTH, Branches, Seeds
 from ..leaves.levels import level_errors
 from ..leaves.models import LeafModel
 from ..parallel import each_on_all_cores
-from ..species.growing import faded
 from ..species.members import expected_polygons
-from ..species.species import Species
+from ..species.species import Species, faded
 from .flora import Flora, compile_species
 from .samples import Points
 

@@ -1,3 +1,3 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""From decisions to buffers, block by block: plants, polygons, proxies, baked light. Numpy only."""
+"""From decisions to buffers, block by block: plants, polygons, proxies. Numpy only."""

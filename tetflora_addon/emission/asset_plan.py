@@ -24,8 +24,7 @@ from numpy.typing import NDArray
 from ..arrays import Floats, Integers, Mask, chunks, column
 from ..camera.camera import Camera
 from ..growth.hashing import Draw, uniform
-from ..proxies.asset_facets import facet_totals, facets_of_assets
-from ..proxies.microsurfaces import Facets
+from ..proxies.microsurfaces import Facets, facet_totals, facets_of_assets
 from ..proxies.primitives import triangle_corners
 from ..refinement.decisions import explicit_fraction
 from ..refinement.loop import Refinement

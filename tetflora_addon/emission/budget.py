@@ -1,23 +1,47 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A budget of polygons: the finest image that fits (beyond the paper, whose only limit is the cutoff).
+"""A budget of polygons: the finest image that fits (beyond the paper, whose only limit is the cutoff); and estimates of
+what refining and expanding will take: seconds, polygons and bytes.
 
 How many polygons and facets an image has follows from the pixels that plants cover: parts are drawn until these are
 full. Where facets are larger, there are fewer, as their area is. Where there are few, they may be finer than they have
 to be. Shells have one size; there, real leaves go to the tetrahedra that gain most by them for each polygon.
+
+Estimates look at a few thousand leaves and branches, which stand for all there are (`compiled.sizes.CrownParts`), more
+of them on near plants. Each has a place in the image and a size there, from which follow its polygons, as they do when
+it is drawn. In each part of the image they lie one behind the other: as many as fill it are drawn, and of what is
+behind them or out of view few facets are made. So numbers follow from the rules of drawing and the budget, with their
+own constants; only how many layers fill a pixel is measured.
+
+Seconds are fitted to the cases of ``python -m benchmarks forest``, at 1920 × 1080 on two cores, whenever refinement
+changes, and those of what is expanded to plants of three species. Other machines differ by their speed.
+
+The leaves and the wood that are near a camera are far finer: a spruce three meters away has a hundred times as many
+polygons as the same one from afar. Branches are few beside the polygons on them, so where all is expanded the nearest
+plants are grown to their twigs to ask each branch how fine it will be.
 """
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..arrays import Floats
+from ..arrays import GOLDEN_ANGLE, GOLDEN_TURN, Floats, Integers, Mask, spread
 from ..camera.camera import Camera
-from ..refinement.decisions import Decision, contributions
+from ..compiled.flora import Flora, extents
+from ..compiled.sizes import LEVEL, Crown, CrownParts
+from ..growth.growth import WholeBranches, leaf_counts, trunks
+from ..growth.seeds import Branches, Seeds
+from ..leaves.levels import chosen_polygons, leaf_planes
+from ..refinement.decisions import Decision, contributions, explicit_fraction
 from ..refinement.loop import Refinement
 from ..refinement.settings import RefinementSettings
-from .drawing import HIDDEN_A_PIXEL, OUTSIDE_A_PIXEL
-from .plants import TOLERANCE
+from ..subplants.pieces import expand
+from ..subplants.rings import BUD_RINGS, bud_sides, finer, round_up_to
+from ..subplants.tubes import tube_faces
+from .drawing import HIDDEN, HIDDEN_A_PIXEL, HIDDEN_LEAVES, LIT_LEAVES, NEVER_TOO_MANY, OUTSIDE_A_PIXEL, SHADOW
+from .frontier import DETAIL
+from .plants import BENT, BROAD, NEARER, SIDES, TOLERANCE, TUBES, TWIG, LeafDetail, kite_widths
 
 #: Approximate bytes of a polygon in Blender (110) and in a renderer (500) together.
 BYTES_PER_POLYGON = 610
@@ -27,7 +51,7 @@ BYTES_PER_TRIANGLE = 380
 A_PIXEL = 12.0
 #: Polygons and facets that are never too many with the facets of *Final*, see `relative_side`; and how many times finer
 #: facets are at most.
-NEVER_TOO_MANY, FINEST = 2_400_000.0, 3.0
+PLENTY, FINEST = 2_400_000.0, 3.0
 #: What an expected number may be off by.
 RESERVE = 0.15
 #: Leaves of what is instanced are real from widths so many times smaller on than those of plants.
@@ -111,7 +135,7 @@ def relative_side(number: float, facet: float) -> float:
     facet : float
         That side, pixels.
     """
-    few = NEVER_TOO_MANY / max(facet / RefinementSettings().facet, 1.0) ** 2
+    few = PLENTY / max(facet / RefinementSettings().facet, 1.0) ** 2
     return float(np.clip(np.sqrt(number / few), 1.0 / FINEST, 1.0))
 
 
@@ -142,3 +166,362 @@ def _large(result: Refinement) -> Floats:
     held = result.cell_polygons.polygons
     large = np.isinf(held.totals.width)
     return np.bincount(held.cell[large], minlength=len(result.tree))[result.nodes].astype(np.float64)
+
+
+#: Seconds of any refinement, of each plant, and of each polygon or facet that is seen, and that nobody sees: of these
+#: there are few for what is opened.
+SECONDS = 1.5
+SECONDS_PER_PLANT = 2.5e-5
+SECONDS_PER_PRIMITIVE = np.array([3e-6, 1.2e-5])
+#: Seconds of each polygon that is expanded, and of each triangle that these consist of.
+SECONDS_EXPANDED = np.array([5e-7, 1.2e-7])
+#: Bytes of each plant.
+BYTES_PER_PLANT = 500.0
+#: Leaves and branches that are looked at, about, how many of them lie in a cell of the image, and how many of a plant
+#: in view for one of a plant that is not.
+_PARTS, _IN_CELL, _IN_VIEW = 4096, 32, 16.0
+#: Layers of leaves in a covered pixel of which something is drawn, with facets of a pixel, about; the larger these are,
+#: the more of them reach beyond what hides them, by the fifth root of their side.
+_LAYERS = 12.0
+#: Pixels that cells cover, which overlap, over those that their leaves do.
+_OVERLAP = 1.17
+#: Hidden facets that stand for others which were made with what hides them, over all that is seen.
+_MERGED = 0.1
+#: Leaves out of view that a facet stands for. Part of these that is lit and throws its shadow into the view, drawn by
+#: facets of `SHADOW` pixels; and how many times as many of those there are as of others out of view, at most.
+_LEAVES, _THROWN, _THROWN_TIMES = 32.0, 0.5, 2.0
+#: Leaves count as so much shorter than they are, about, see `leaf_meshes`.
+_SHARE = 0.85
+#: How far twigs are off their chords, in lengths of these: arcs of a radian.
+_BEND = 1 / 8
+
+
+@dataclass(frozen=True)
+class Stand:
+    """Plants of a scene, or some of them that stand for all."""
+
+    number: Floats  # (k,): plants that each stands for
+    foot: Floats  # (k, 3): where they stand, meters
+    scale: Floats  # (k,)
+    which: Integers  # (k,): their crowns, as indices into the next
+    crowns: tuple[Crown, ...]
+
+    def in_view(self, camera: Camera) -> Mask:
+        """Plants (k,) of which something is in the image, as far as their crowns are upright spheroids."""
+        radius, height = self.radius, self._of_crowns("height")
+        return camera.distance_to_view(self.foot + height[:, None] * (0.0, 0.0, 0.5)) < radius
+
+    @property
+    def radius(self) -> Floats:
+        """Radius (k,) of crowns, meters."""
+        return self._of_crowns("radius")
+
+    def _of_crowns(self, name: str) -> Floats:
+        return np.array([getattr(crown, name) for crown in self.crowns])[self.which] * self.scale
+
+    def parts(self, camera: Camera) -> tuple[CrownParts, Integers]:
+        """Leaves and branches (n) of all plants as they stand, and the plant that each is on.
+
+        Plants are turned any way. More stand for one that is near and in view.
+        """
+        away = np.linalg.norm(self.foot - camera.eye, axis=1)
+        size = np.maximum(self.radius, self._of_crowns("height"))
+        # Places and scales without a number, or with one too large, are for Refine to tell; here they count as nothing.
+        there = np.isfinite(away + size)
+        away, size = (np.where(there, of, 0.0) for of in (away, size))
+        near = size / np.maximum(np.maximum(away, size), 1e-9)
+        near = np.where(self.in_view(camera), near, near / _IN_VIEW)
+        every = np.array([len(crown.parts) for crown in self.crowns])[self.which]
+        some = np.clip(np.ceil(_PARTS * near / max(near.sum(), 1e-9)), 1, every).astype(np.int64)
+        order = np.empty(len(self.foot), np.int64)  # by places: that of a scene's objects is chance
+        order[np.lexsort(np.round(self.foot.T, 4))] = np.arange(len(self.foot))
+        turn = order * GOLDEN_TURN
+        found, plants = [CrownParts.empty()], [np.zeros(0, np.int64)]
+        for number, crown in enumerate(self.crowns):
+            own = np.flatnonzero((self.which == number) & there)
+            owner, index = spread(some[own])
+            plant = own[owner]
+            each, scale = every[plant] / some[plant], self.scale[plant]
+            part = crown.parts.take(((index + turn[plant] % 1.0) * each).astype(np.int64) % every[plant])
+            (x, y, z), angle = part.position.T * scale, order[plant] * GOLDEN_ANGLE
+            x, y = np.cos(angle) * x - np.sin(angle) * y, np.sin(angle) * x + np.cos(angle) * y
+            part = replace(
+                part,
+                position=np.stack([x, y, z], axis=1) + self.foot[plant],
+                number=part.number * each * self.number[plant],
+                area=part.area * scale**2,
+                width=part.width * scale,
+                length=part.length * scale,
+                reach=part.reach * scale,
+            )
+            found.append(part)
+            plants.append(plant)
+        return CrownParts.concatenate(found), np.concatenate(plants)
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """What a refinement will take."""
+
+    plants: int
+    primitives: float  # polygons and facets
+    seconds: float
+    memory: float  # bytes of the whole process with the result, and rendering it
+    limited: bool  # whether a limit of the settings makes plants coarser
+
+
+def estimate(
+    stand: Stand,
+    camera: Camera,
+    settings: RefinementSettings,
+    used: float,
+    allowed: float,
+    everything: bool = False,
+) -> Estimate:
+    """Estimate a refinement.
+
+    Parameters
+    ----------
+    stand : Stand
+    camera : Camera
+    settings : RefinementSettings
+    used : float
+        Bytes that are taken already, and that the renderer will need for its picture.
+    allowed : float
+        Bytes left for results, see `memory.allowance`; infinite without a limit.
+    everything : bool
+        Whether plants are expanded instead of refined; limits do not hold then.
+    """
+    parts, plant = stand.parts(camera)
+    extent = camera.extent_around(parts.position)
+    whole = _polygons(stand.crowns, parts, stand.which[plant], camera, extent)
+    plants = round(stand.number.sum())
+    seconds, memory = SECONDS + SECONDS_PER_PLANT * plants, used + BYTES_PER_PLANT * plants
+    if everything:
+        made = whole @ parts.number
+        memory += BYTES_PER_TRIANGLE * float(made[1])
+        return Estimate(plants, float(made[0]), seconds + float(SECONDS_EXPANDED @ made), memory, False)
+    each = _numbers(stand, camera, settings, parts, plant, extent, whole[0])
+    wanted = float(each.sum())
+    made = min(wanted, settings.max_polygons or np.inf, allowed / BYTES_PER_POLYGON)
+    seconds += float(SECONDS_PER_PRIMITIVE @ each) * made / max(wanted, 1.0)
+    memory += BYTES_PER_POLYGON * made
+    return Estimate(plants, made, seconds, memory, wanted > made)
+
+
+def _numbers(
+    stand: Stand,
+    camera: Camera,
+    settings: RefinementSettings,
+    parts: CrownParts,
+    plant: Integers,
+    extent: Floats,
+    whole: Floats,
+) -> Floats:
+    """Polygons and facets without limits that are seen, and that nobody sees (2,).
+
+    ``whole`` (n,) is `_polygons` of parts, ``extent`` (n,) meters of a pixel.
+    """
+    pixels = camera.width * camera.height
+    inside = _inside(parts, camera, extent)
+    outside = ~inside & (parts.form >= 0)
+    leaves = np.where(outside, parts.number, 0.0) / _LEAVES
+    beside = stand.in_view(camera)[plant]
+    deep = _through(stand, parts, plant, extent)
+    shadows, shadow = parts.take(outside), SHADOW * extent[outside]
+    one, each, planes = _kites(stand.crowns, parts, stand.which[plant])[:, inside]
+    parts = parts.take(inside)
+    extent, whole = extent[inside], whole[inside]
+    area, wide, wood = parts.area / extent**2, parts.width / extent, parts.form < 0
+    before, here, covered = _in_depth(parts, camera, parts.number * area)
+    coarser = _coarser(_OVERLAP * covered, pixels, settings.facet)
+    facet = (coarser * settings.facet) ** 2
+    most = _LAYERS * facet**0.1 + deep[inside]
+    drawn = np.exp(-before / most) * -np.expm1(-here / most) * most / here
+    # Leaves are facets, kites, or have their polygons; branches are triangles, or tubes.
+    real = explicit_fraction(wide, coarser * settings.leaf_limit)
+    faces = 1.0 + (planes - 1.0) * explicit_fraction(wide, one) + (whole - planes) * explicit_fraction(wide, each)
+    leaf = (1.0 - real) * np.minimum(area / facet, 1.0) + real * faces
+    tube = np.where(wide < BROAD, np.minimum(parts.sides, SIDES) * parts.segments, whole)
+    tubes = explicit_fraction(wide, TUBES)
+    bows = np.clip(np.sqrt(_BEND * parts.length / (BENT * extent)), 1.0, np.maximum(parts.segments, 1))
+    branch = tubes * tube + (1.0 - tubes) * bows * np.clip(area / (TWIG * facet), 0.0, 1.0)
+    seen = float((drawn * parts.number) @ np.where(wood, branch, leaf))
+    # Areas without bounds are no number of facets.
+    thrown = shadows.number / np.fmax((coarser * shadow) ** 2 / np.maximum(shadows.area, 1e-300), LIT_LEAVES)
+    few = max(OUTSIDE_A_PIXEL * pixels, NEVER_TOO_MANY) / coarser**2
+    unseen = _MERGED * seen + min(_THROWN * float(thrown.sum()), _THROWN_TIMES * few)
+    # Of what is not seen a facet stands for several leaves.
+    behind = (1.0 - drawn) * parts.number * area / np.maximum(HIDDEN_LEAVES * area, HIDDEN**2 * facet)
+    for number, a_pixel in (
+        (behind[~wood].sum(), HIDDEN_A_PIXEL),
+        (leaves[beside].sum(), OUTSIDE_A_PIXEL),  # drawn with what is seen of the same plants
+        (leaves[~beside].sum(), OUTSIDE_A_PIXEL),
+    ):
+        unseen += min(float(number), max(a_pixel * pixels, NEVER_TOO_MANY) / coarser**2)
+    return np.array([seen, unseen])
+
+
+def _inside(parts: CrownParts, camera: Camera, extent: Floats) -> Mask:
+    """Leaves and branches (n,) of which something is in view."""
+    # Of branches that are drawn as a whole, spheres around them are tested, as `Coverage.of_spheres` has them.
+    sphere = np.sqrt(0.5) * parts.length
+    away = np.inf if camera.kind == "ORTHO" else extent / camera.pixel_size
+    branch = np.where(parts.width / extent < BROAD, parts.reach, sphere / np.maximum(1.0 - sphere / away, 0.1))
+    reach = np.where(parts.form < 0, branch, 0.25 * parts.length)
+    depth = camera.to_camera_space(parts.position)[:, 2]
+    between = (camera.kind == "PANO") | ((depth + reach > camera.near) & (depth - reach < camera.far))
+    return between & (camera.distance_to_view(parts.position) <= reach)
+
+
+def _polygons(crowns: tuple[Crown, ...], parts: CrownParts, which: Integers, camera: Camera, extent: Floats) -> Floats:
+    """Polygons and triangles (2, n) of leaves and branches at the level of detail they have where they come nearest."""
+    slope = 0.0 if camera.kind == "ORTHO" else camera.pixel_size
+    extent = np.maximum(extent - slope * parts.reach, extent / NEARER)
+    out = np.ones((2, len(parts)))
+    for number, crown in enumerate(crowns):
+        for kind, form in enumerate(crown.forms):
+            own = np.flatnonzero((which == number) & (parts.form == kind))
+            if form is not None and len(own):
+                out[:, own] = chosen_polygons(form, _SHARE * parts.length[own] / extent[own] / TOLERANCE)
+    wood = np.flatnonzero(parts.form < 0)
+    sides, size = parts.sides[wood], parts.width[wood] / extent[wood] / 2.0
+    around, along = finer(sides, size)
+    buds = np.where(size > round_up_to(sides), parts.buds[wood], 0.0)
+    out[:, wood] = around * parts.segments[wood] * along + buds * (BUD_RINGS - 1) * bud_sides(around)
+    out[1, wood] *= 2.0
+    return out
+
+
+def _kites(crowns: tuple[Crown, ...], parts: CrownParts, which: Integers) -> Floats:
+    """Widths in pixels up to which leaves are kites, and have one for each plane; how many planes that are (3, n)."""
+    out = np.ones((3, len(parts)))
+    for number, crown in enumerate(crowns):
+        for kind, form in enumerate(crown.forms):
+            own = (which == number) & (parts.form == kind)
+            if form is not None:
+                out[:, own] = np.array([[*kite_widths([form]), leaf_planes(form).polygons]]).T
+    return out
+
+
+def _through(stand: Stand, parts: CrownParts, plant: Integers, extent: Floats) -> Floats:
+    """Layers of leaves (n,) that are drawn beside those that fill pixels: of crowns that are small all are."""
+    radius = np.maximum(stand.radius, 1e-9)
+    # Of plants that stand for others as well, the leaves of one.
+    area = np.bincount(plant, parts.number * parts.area, len(radius))
+    through = area / (np.pi * radius**2 * stand.number)
+    return through[plant] * np.minimum(DETAIL * extent / (2.0 * radius[plant]), 1.0)
+
+
+def _in_depth(parts: CrownParts, camera: Camera, pixels: Floats) -> tuple[Floats, Floats, float]:
+    """Layers (n,) before each of parts (n,) that have so many pixels (n,) in all, its own (n,), and covered pixels.
+
+    In each cell of the image parts lie one behind the other.
+    """
+    if not len(parts):
+        return np.zeros(0), np.zeros(0), 0.0
+    local = camera.to_camera_space(parts.position)
+    x, y, depth = local.T
+    if camera.kind == "PANO":
+        (x, y), depth = camera.longitude_latitude(local), np.linalg.norm(local, axis=1)
+    elif camera.kind == "PERSP":
+        x, y = x / np.maximum(depth, camera.near), y / np.maximum(depth, camera.near)
+    left, right, bottom, top = camera.window
+    x, y = np.clip((x - left) / (right - left), 0.0, 1.0), np.clip((y - bottom) / (top - bottom), 0.0, 1.0)
+    strips = max(round(np.sqrt(len(x) / _IN_CELL)), 1)
+    column, wide = _groups(x, np.zeros(len(x), np.int64), strips)
+    cell, tall = _groups(y, column, strips)
+    size = np.maximum((wide[np.arange(len(tall)) // strips] * tall) * camera.width * camera.height, 1.0)
+    order = np.lexsort((depth, cell))
+    layers, own = np.maximum(pixels / size[cell], 1e-12), cell[order]
+    every = np.bincount(cell, layers, len(size))
+    before = np.empty(len(parts))
+    before[order] = np.cumsum(layers[order]) - layers[order] - (np.cumsum(every) - every)[own]
+    # A layer of what is turned all ways covers a part of its area.
+    return before, layers, float(-(size * np.expm1(-LEVEL * every)).sum())
+
+
+def _groups(place: Floats, group: Integers, number: int) -> tuple[Integers, Floats]:
+    """Each group of things (n,) at places (n,) divided into so many of equally many: which (n,), and how wide (k,)."""
+    order = np.lexsort((place, group))
+    count = np.bincount(group)
+    rank = np.arange(len(place)) - (np.cumsum(count) - count)[group[order]]
+    out = np.empty(len(place), np.int64)
+    out[order] = group[order] * number + rank * number // count[group[order]]
+    many = np.bincount(out, minlength=len(count) * number)
+    low, high = np.full(len(many), np.inf), np.full(len(many), -np.inf)
+    np.minimum.at(low, out, place)
+    np.maximum.at(high, out, place)
+    # Those on the border stand for as much beyond it as is between two.
+    return out, np.where(many > 1, (high - low) * many / np.maximum(many - 1, 1), 0.0)
+
+
+def _coarser(covered: float, pixels: float, facet: float) -> float:
+    """Sides of facets over those that are asked for, as of `fit_to_budget` without limits."""
+    number = A_PIXEL * covered / facet**2 + (HIDDEN_A_PIXEL + OUTSIDE_A_PIXEL) * pixels
+    return relative_side(number, facet)
+
+
+#: Plants that are grown one and all, the nearest ones, and how many of the others tell about them.
+_ALL, _SOME = 32, 16
+#: Leaves count as so much shorter than they are, each by its own number, see `leaf_meshes`.
+_LENGTHS = (0.75, 0.85, 0.95)
+
+
+def coarse_faces(flora: Flora, seeds: Seeds) -> Floats:
+    """Expected polygons (2,) of plants far from any camera, and the triangles that these consist of."""
+    plants = trunks(flora.rows, seeds)
+    every, wood = flora.face_counts(plants), flora.branch_faces(plants)
+    each = np.array([sum(f.triangles for f in own[0]) / max(sum(f.polygons for f in own[0]), 1) for own in flora.forms])
+    triangles = 2.0 * wood + (every - wood) * each[flora.species_of(plants.row)]
+    return np.array([every.sum(), triangles.sum()])
+
+
+def expanded_faces(flora: Flora, seeds: Seeds, camera: Camera) -> Iterator[Floats]:
+    """Expected polygons (2,) of all plants as `expanded_blocks` makes them for a camera, and triangles.
+
+    Yields
+    ------
+    (2,) float64
+        Numbers that are more with each item, of which the last ones count; who waits for a limit may stop before.
+    """
+    plants, total = trunks(flora.rows, seeds), coarse_faces(flora, seeds)
+    yield total
+    bound = extents(flora, plants)
+    across = np.maximum(bound[:, 0], np.abs(bound[:, 1:3]).max(axis=1)) * plants.length
+    away = np.linalg.norm(plants.position - camera.position, axis=1) - across
+    order = np.argsort(away, kind="stable")
+    detail = LeafDetail(flora, camera)
+    for number in range(min(_ALL, len(order))):
+        total = total + _more(flora, plants.take(order[number : number + 1]), detail)
+        yield total
+    rest = order[_ALL:]
+    some = rest[np.linspace(0, len(rest) - 1, min(_SOME, len(rest))).round().astype(np.int64)]
+    for number in range(len(some)):
+        total = total + _more(flora, plants.take(some[number : number + 1]), detail) * len(rest) / len(some)
+        yield total
+
+
+def _more(flora: Flora, plants: Branches, detail: LeafDetail) -> Floats:
+    """Polygons and triangles (2,) of plants beyond those of the models of their species."""
+    found = np.zeros(2)
+    for whole in expand(flora, plants):
+        found += _finer_leaves(flora, whole, detail) + _finer_wood(flora, whole, detail) * np.array([1.0, 2.0])
+    return found
+
+
+def _finer_leaves(flora: Flora, whole: WholeBranches, detail: LeafDetail) -> Floats:
+    lengths, leaves = detail.lengths(whole), leaf_counts(flora.rows, whole.branches)
+    found, near = np.zeros(2), np.flatnonzero((lengths > 0.0) & (leaves > 0))
+    species = flora.rows["species"][whole.branches.row[near]]
+    for s in np.unique(species):
+        own = near[species == s]
+        forms = flora.forms[s][0]
+        each = [chosen_polygons(f, part * lengths[own]) for f in forms for part in _LENGTHS]
+        plain = np.mean([(f.polygons, f.triangles) for f in forms], axis=0)
+        found += (np.mean(each, axis=0) - plain[:, None]) @ leaves[own]
+    return found
+
+
+def _finer_wood(flora: Flora, whole: WholeBranches, detail: LeafDetail) -> float:
+    return tube_faces(flora, whole, detail.wood) - tube_faces(flora, whole)

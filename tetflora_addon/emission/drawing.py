@@ -14,15 +14,13 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ..arrays import Arrays, Floats, Floats32, Integers, Keys, Mask, gathered, unit
+from ..arrays import Arrays, Floats, Floats32, Integers, Mask, unit
 from ..buffers import MeshBuffers, concatenate_buffers, kept_faces
 from ..camera.camera import Camera
 from ..compiled.flora import Flora
 from ..growth.hashing import place_keys, uniform
 from ..processes.pool import in_processes
-from ..proxies.cast_shadows import ShadowReach
 from ..proxies.facet_weights import FacetWeights
 from ..proxies.microsurfaces import CIRCUMRADIUS, STRETCH, Facets, pushed_outside_view
 from ..proxies.primitives import Primitive, Triangles, joined, triangle_corners
@@ -30,10 +28,9 @@ from ..refinement.contents import polygon_totals
 from ..refinement.loop import Refinement
 from ..refinement.shared_parts import SharePoints
 from .asset_plan import PlacedClusters
-from .coverage import Coverage, Shade
-from .frontier import DETAIL, FEW, Frontier, FrontierKind, Shown, Waiting, Whose
-from .plant_parts import GrownPlants, PlantRows
-from .plants import Block, Transition
+from .coverage import Coverage, Shade, ShadowReach
+from .frontier import DETAIL, FEW, Canvas, Frontier, FrontierKind, Shown, Waiting, Whose, corners_of_faces
+from .plants import Block, GrownPlants, PlantRows, Transition
 from .polygons import FaceRows, Faces
 
 #: Least width of a tile, pixels, and pixels around it that its coverage knows.
@@ -43,8 +40,6 @@ TILE, AROUND = 240, 64
 _WIDER = 0.25
 #: How many primitives nobody sees become one, as many as lie behind full pixels together.
 MERGED = (4.0, 16.0, 64.0)
-#: The same of those that are hidden when they are about to be made.
-SOONER = (4.0, 16.0)
 #: Side of facets of hidden parts where the light reaches them, in sides of those that are seen; the optical depth in
 #: the shade over which it grows by e; and the largest.
 HIDDEN, SHADED, LARGEST = 4.0, 1.5, 32.0
@@ -79,7 +74,7 @@ _SLAB = 0.06
 #: Part of all that may be drawn which plants out of view have.
 _UNSEEN = 0.05
 #: Draws of this module.
-_MERGE, _LEFT, _THIN, _SCARCE = 230, 232, 233, 234
+_MERGE, _LEFT, _SCARCE = 230, 232, 234
 
 #: What becomes of facets, which the camera sees or not. Another process may call it.
 FacetConverter = Callable[[Facets, bool], Any]
@@ -227,19 +222,14 @@ def _drawn_tile(
     return tile.made(number)
 
 
-class _Tile:
+class _Tile(Canvas):
     """One tile while it is drawn."""
 
     def __init__(self, given: Drawing, columns: tuple[int, int] | None) -> None:
-        self.given = given
         around = None if columns is None else (columns[0] - AROUND, columns[1] + AROUND)
-        self.coverage = Coverage(given.camera, around or (0, 1))
-        self.frontier = Frontier(given.kinds, self.coverage, given.facet)
-        self._meshes: dict[tuple[str, int, int], list[MeshBuffers]] = {}
+        super().__init__(Coverage(given.camera, around or (0, 1)))
+        self.given, self.frontier = given, Frontier(given.kinds, self.coverage, given.facet)
         self._facets: dict[tuple[Whose, bool], list[Primitive]] = {}
-        # What was made between two depths: whose facets, or kinds and meshes, and their corners.
-        self._waiting: list[tuple[Any, Any, Floats32]] = []
-        self.number = 0.0
         self._drawn = 0.0  # those of what is seen
         self._asked = 0.0  # polygons and facets that there would be with sides as they are asked for
 
@@ -247,8 +237,8 @@ class _Tile:
         """Meshes by kind, facets by whose they are, and what is drawn as it is; the tile lets go of each."""
         blocks = [
             Block(*what, number, whole, 1.0)
-            for what in sorted(self._meshes)
-            if (whole := concatenate_buffers(self._meshes.pop(what))) is not None
+            for what in sorted(self.meshes)
+            if (whole := concatenate_buffers(self.meshes.pop(what))) is not None
         ]
         coarser = float(np.sqrt(max(self._asked / max(self._drawn, 1.0), 1.0)))
         owners = sorted({one for one, _ in self._facets}, key=lambda one: (one[0] is None, one[0] or 0, one[1]))
@@ -298,13 +288,13 @@ class _Tile:
         extent_around = self.given.camera.extent_around
 
         def size(mesh: MeshBuffers) -> Floats:
-            faces = _facets_of_faces(*_corners_of_faces(mesh), mesh, np.arange(mesh.polygons))
+            faces = _facets_of_faces(*corners_of_faces(mesh), mesh, np.arange(mesh.polygons))
             return faces.side / extent_around(faces.center)
 
         for seen in (False, None, True):
             there: dict[Any, Any] = {what: joined(own) for what, own in self._facets.items() if what[1] == seen}
             if seen is None:
-                there = {what: concatenate_buffers(own) for what, own in self._meshes.items()}
+                there = {what: concatenate_buffers(own) for what, own in self.meshes.items()}
             ranks = [size(one) if seen is None else uniform(place_keys(_places(one)), _LEFT) for one in there.values()]
             first = np.cumsum([0, *map(len, ranks)])
             gone = int(min(np.ceil(max(number, 0.0)), first[-1]))
@@ -314,7 +304,7 @@ class _Tile:
             kept[np.argsort(np.concatenate(ranks), kind="stable")[:gone]] = False
             for (what, one), own in zip(there.items(), np.split(kept, first[1:-1]), strict=True):
                 if seen is None:
-                    self._meshes[what] = [kept_faces(one, own)]
+                    self.meshes[what] = [kept_faces(one, own)]
                 elif own.any():
                     self._facets[what] = [one.take(np.flatnonzero(own))]
                 else:
@@ -323,52 +313,13 @@ class _Tile:
 
     # -- what is seen ---------------------------------------------------------------------------------------------
 
-    def add_facets(self, whose: Whose, facets: Facets) -> None:
-        """As of `Canvas`."""
-        if len(facets):
-            self._waiting.append((whose, facets, triangle_corners(facets)))
-
-    def thin(self, key: Keys, center: NDArray[np.floating], radius: NDArray[np.floating]) -> tuple[Integers, Floats]:
-        """As of `Canvas`."""
-        times, left = np.ones(len(key)), np.arange(len(key))
-        center = center.astype(np.float32)
-        for more in SOONER:
-            reach = np.sqrt(more) * radius[left]
-            left = left[self.coverage.hidden(self.coverage.of_spheres(gathered(center, left), reach))]
-            times[left] = more
-        kept = np.flatnonzero(uniform(key, _THIN) < 1.0 / times)
-        return kept, times[kept]
-
-    def add_shown(self, corners: NDArray[np.floating], number: float = 0.0) -> None:
-        """As of `Canvas`."""
-        self.number += number
-        _, *drawn = self.coverage.of_corners(corners)
-        self._fill(*drawn)
-
-    def add_mesh(self, what: tuple[str, int, int], buffers: MeshBuffers | None, culled: bool = False) -> None:
-        """As of `Canvas`."""
-        if buffers is None or not buffers.polygons:
-            return
-        corners, _ = _corners_of_faces(buffers)
-        if culled:
-            self._waiting.append((what, buffers, corners))
-            return
-        self.add_shown(corners, buffers.polygons)
-        self._meshes.setdefault(what, []).append(buffers)
-
-    def _fill(self, column: NDArray, row: NDArray, depth: NDArray) -> None:
-        """Cover what polygons with corners (k, n) cover."""
-        for k in range(1, len(column) - 1):
-            fan = [0, k, k + 1]
-            self.coverage.draw(column[fan], row[fan], depth[fan])
-
     def _cover(self) -> None:
         """Let what was made cover the image and test it; few stand for what is hidden."""
-        waiting, self._waiting = self._waiting, []
+        waiting, self.waiting = self.waiting, []
         tested = [self.coverage.tested(corners, _WIDER) for _, _, corners in waiting]
         for *_, drawn in tested:
             for polygons in drawn:
-                self._fill(*polygons)
+                self.fill(*polygons)
         lost: dict[Whose, list[tuple[Facets, Floats]]] = {}
         for (what, made, corners), (prints, gone, _) in zip(waiting, tested, strict=True):
             seen = np.flatnonzero(~gone)
@@ -388,7 +339,7 @@ class _Tile:
             made = kept_faces(made, ~gone) if gone.any() else made
             if made.polygons:
                 self.number += made.polygons
-                self._meshes.setdefault(what, []).append(made)
+                self.meshes.setdefault(what, []).append(made)
         for whose, every in lost.items():
             self._merge(joined([facets for facets, _ in every]), np.concatenate([n for _, n in every]), whose)
 
@@ -551,13 +502,6 @@ def quarters(facets: Facets) -> Facets:
     half = replace(facets, side=0.5 * facets.side)
     parts = [replace(half, center=0.5 * (facets.center + corners[:, k])) for k in range(3)]
     return Facets.concatenate([*parts, replace(half, across=-facets.across, along=-facets.along)])
-
-
-def _corners_of_faces(mesh: MeshBuffers) -> tuple[Floats32, Integers]:
-    """Corners (f, k, 3) of one or more faces, the last of which repeats beyond their size (f,), and that."""
-    size, first = np.diff(mesh.face_offsets), mesh.face_offsets[:-1]
-    every = first[:, None] + np.minimum(np.arange(int(size.max())), size[:, None] - 1)
-    return mesh.positions[mesh.corner_verts[every]], size
 
 
 def _facets_of_faces(corners: Floats32, size: Integers, buffers: MeshBuffers, faces: Integers) -> Facets:

@@ -13,6 +13,7 @@ from ..arrays import Floats, Integers
 from ..buffers import MeshBuffers, PointBuffers
 from ..camera.camera import Camera
 from ..compiled.flora import Flora
+from ..light.illumination import BakedLight, baked_attributes
 from ..proxies.microsurfaces import Facets
 from ..proxies.primitives import (
     Primitive,
@@ -30,7 +31,6 @@ from ..refinement.loop import Refinement
 from .asset_plan import AssetPlan, OriginalPolicy, explicit_plan
 from .drawing import Drawing, FacetConverter, Parts, drawn_blocks
 from .frontier import Shown
-from .light import BakedLight, baked_attributes
 from .plants import TOLERANCE, Block, explicit_blocks
 from .polygons import FaceRows, PolygonBlock, kept_polygons, polygon_blocks
 from .shells import proxy_shells

@@ -11,14 +11,16 @@ what to open before anything is drawn (`refinement`); what is hidden is decided 
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import Protocol, Self
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import Arrays, Floats, Integers, Keys, Mask
+from ..arrays import Arrays, Floats, Floats32, Integers, Keys, Mask, gathered
 from ..buffers import MeshBuffers
+from ..growth.hashing import uniform
 from ..proxies.microsurfaces import Facets
+from ..proxies.primitives import triangle_corners
 from .coverage import CELL, Coverage, Footprints
 
 #: Pixels, and facets, down to which parts that are seen are opened: smaller ones are drawn at their samples.
@@ -32,6 +34,10 @@ FIRST = 2.0
 
 #: One-sided layers of leaves that are enough where nothing is seen, and how much of its box a crown fills.
 LAYERS, FILLED = 6.0, 0.6
+
+#: How many primitives that are hidden when they are about to be made become one.
+SOONER = (4.0, 16.0)
+_THIN = 233  # draw of this module
 
 #: Whose facets some are: a species, assets, or None for your own meshes; and the look of those that are no plants.
 Whose = tuple[int | None, str]
@@ -51,20 +57,60 @@ class Waiting(Arrays):
     count: Floats  # (n,): facets that they would have, all of them
 
 
-class Canvas(Protocol):
+class Canvas:
     """Where kinds draw what is seen of them: a tile of the image."""
+
+    def __init__(self, coverage: Coverage) -> None:
+        self.coverage, self.number = coverage, 0.0  # of polygons and facets
+        self.meshes: dict[tuple[str, int, int], list[MeshBuffers]] = {}
+        # What was made between two depths: whose facets, or kinds and meshes, and their corners.
+        self.waiting: list[tuple[Any, Any, Floats32]] = []
 
     def add_facets(self, whose: Whose, facets: Facets) -> None:
         """Facets, to be tested and drawn together with all else of the slab."""
-
-    def add_mesh(self, what: tuple[str, int, int], buffers: MeshBuffers | None, culled: bool = False) -> None:
-        """A mesh of a species, without faces behind full pixels if it is culled."""
+        if len(facets):
+            self.waiting.append((whose, facets, triangle_corners(facets)))
 
     def thin(self, key: Keys, center: NDArray[np.floating], radius: NDArray[np.floating]) -> tuple[Integers, Floats]:
         """As of `pieces.Thin`: few large ones are made in the place of many that are hidden already."""
+        times, left = np.ones(len(key)), np.arange(len(key))
+        center = center.astype(np.float32)
+        for more in SOONER:
+            reach = np.sqrt(more) * radius[left]
+            left = left[self.coverage.hidden(self.coverage.of_spheres(gathered(center, left), reach))]
+            times[left] = more
+        kept = np.flatnonzero(uniform(key, _THIN) < 1.0 / times)
+        return kept, times[kept]
 
     def add_shown(self, corners: NDArray[np.floating], number: float = 0.0) -> None:
         """Polygons with corners (n, k, 3) of what is drawn as it is; they count as so many."""
+        self.number += number
+        _, *drawn = self.coverage.of_corners(corners)
+        self.fill(*drawn)
+
+    def add_mesh(self, what: tuple[str, int, int], buffers: MeshBuffers | None, culled: bool = False) -> None:
+        """A mesh of a species, without faces behind full pixels if it is culled."""
+        if buffers is None or not buffers.polygons:
+            return
+        corners, _ = corners_of_faces(buffers)
+        if culled:
+            self.waiting.append((what, buffers, corners))
+            return
+        self.add_shown(corners, buffers.polygons)
+        self.meshes.setdefault(what, []).append(buffers)
+
+    def fill(self, column: NDArray, row: NDArray, depth: NDArray) -> None:
+        """Cover what polygons with corners (k, n) cover."""
+        for k in range(1, len(column) - 1):
+            fan = [0, k, k + 1]
+            self.coverage.draw(column[fan], row[fan], depth[fan])
+
+
+def corners_of_faces(mesh: MeshBuffers) -> tuple[Floats32, Integers]:
+    """Corners (f, k, 3) of one or more faces, the last of which repeats beyond their size (f,), and that."""
+    size, first = np.diff(mesh.face_offsets), mesh.face_offsets[:-1]
+    every = first[:, None] + np.minimum(np.arange(int(size.max())), size[:, None] - 1)
+    return mesh.positions[mesh.corner_verts[every]], size
 
 
 class FrontierKind:

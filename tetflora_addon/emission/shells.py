@@ -11,11 +11,11 @@ from ..arrays import GOLDEN_TURN, Floats, Floats32, Mask, spiral
 from ..buffers import MeshBuffers
 from ..compiled.flora import Flora
 from ..growth.hashing import mix, uniform
+from ..light.illumination import BakedLight
 from ..proxies.summaries import extinction_matrices, summarize
 from ..refinement.decisions import Decision
 from ..refinement.loop import Refinement
 from ..tetrahedra.geometry import EDGES, FACES, volume
-from .light import BakedLight
 
 #: Fraction of its size by which a shell is smaller than its tetrahedron, minimum and maximum.
 GAP, MOST_GAP = 1e-3, 0.05

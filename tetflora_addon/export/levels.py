@@ -3,7 +3,7 @@
 """Levels of detail of single plants, by the method that refinement has: leaves are thinned by hashes of their keys.
 
 A level is made for the size that a pixel has at the plant. Leaves that are smaller are fewer and larger, so that their
-area stays, and have the form of kites (`leaves.kites`); wood that is thin is triangles, and of very thin wood fewer
+area stays, and have the form of kites (`leaves.levels`); wood that is thin is triangles, and of very thin wood fewer
 are wider. Facets hide each other in another way than leaves do, so that the area of each level is corrected by what it
 covers from afar: cover, mean color and outline are measured in parallel views of small cells.
 """

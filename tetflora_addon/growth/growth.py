@@ -12,13 +12,28 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays import Arrays, Floats, Integers, Integers32, Keys, Table, by_component, columns, dot, spread
-from ..species.growing import faded
 from ..species.members import dead_vigor
+from ..species.species import faded
 from . import crown_effects
 from .axes import Axes, axes, profile
-from .grown_rows import FADES, NOW, Grown, child_number, fullness_of, grown_nodes, lengths
 from .hashing import Draw, child_key, key_of_seed, signed, uniform
-from .rows import BOX, DEAD, FLARE_RINGS, FORK, LATERAL, SPUR, ranged, varied
+from .rows import (
+    BOX,
+    DEAD,
+    FADES,
+    FLARE_RINGS,
+    FORK,
+    LATERAL,
+    NOW,
+    SPUR,
+    Grown,
+    child_number,
+    fullness_of,
+    grown_nodes,
+    lengths,
+    ranged,
+    varied,
+)
 from .seasons import plant_years
 from .seeds import BASE, LEAVES, Branches, Pose, Seeds
 from .wind import axis_and_angle, is_windy, moment, turned_by, turned_vectors

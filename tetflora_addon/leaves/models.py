@@ -32,9 +32,8 @@ from ..arrays import (
 from ..errors import SpeciesError
 from ..files import beside
 from ..parameters import limited
-from .blades import Compound
 from .outlines import Blade
-from .surfaces import Needles, next_corners
+from .surfaces import Compound, Needles, next_corners
 
 MAX_LEAF_POLYGONS = 2000
 MAX_LEAF_CORNERS = 4 * MAX_LEAF_POLYGONS  # of all faces; and vertices

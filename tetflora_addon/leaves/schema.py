@@ -9,11 +9,10 @@ import numpy as np
 
 from ..errors import SpeciesError, quoted
 from ..parameters import FileReader
-from .blades import Compound, check_outline
 from .levels import TOLERANCES, fitted, shown_area, surface_of
 from .models import LEAF_MODELS, OUTLINES, LeafModel, Spines, closed_parts, leaf_model
 from .outlines import Blade
-from .surfaces import Needles
+from .surfaces import Compound, Needles, check_outline
 
 #: Most forms of a leaf.
 MAX_FORMS = 8

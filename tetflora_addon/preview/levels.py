@@ -27,8 +27,7 @@ from ..camera.camera import Camera
 from ..compiled.flora import Flora
 from ..refinement.contents import Contents
 from ..refinement.decisions import Decision, contributions, mean_extinction
-from ..refinement.loop import Refinement, step_of
-from ..refinement.statistics import Step
+from ..refinement.loop import Refinement, Step, step_of
 from ..subplants.pieces import piece_leaf_colors
 from ..tetrahedra.geometry import barycentric_gradients, volume
 from ..tetrahedra.tree import TetrahedralTree

@@ -17,8 +17,7 @@ import numpy as np
 
 from ..arrays import Floats, Floats32, Integers, Integers32
 from ..camera.camera import origin_near
-from ..compiled.flora import Flora
-from ..compiled.placed import extents, outlines
+from ..compiled.flora import Flora, extents, outlines
 from ..growth.growth import trunk_lengths, trunks
 from ..growth.seeds import Branches, Seeds
 from .levels import as_shown

@@ -29,12 +29,10 @@ from pathlib import Path
 from typing import Self
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..arrays import GOLDEN_TURN, Floats, Floats32, Integers, Mask, Table, spiral, spread
-from ..compiled.clumping import fingerprint
+from ..compiled.clumping import PlantElements, basis, elements_of, fingerprint
 from ..compiled.flora import Flora, compile_species
-from ..compiled.rays import PlantElements, basis, elements_of
 from ..growth.foliage import are_solids
 from ..growth.growth import trunks
 from ..growth.hashing import mix
@@ -45,7 +43,7 @@ from ..species.ages import ages_of, with_age
 from ..species.species import Species
 from ..storage import cached
 from ..subplants.pieces import Pieces, open_subplants
-from .microsurfaces import CIRCUMRADIUS, SIN_60, Facets, piece_facets, subplant_facets
+from .microsurfaces import CIRCUMRADIUS, SIN_60, Facets, by_number, piece_facets, subplant_facets
 
 #: Weights of the shipped species, made by ``python -m devtools.facet_tables``. Raise `_METHOD` when facets or weights
 #: are made differently.
@@ -95,24 +93,16 @@ class FacetWeights:
 def _with_share(tables: Floats, row: Integers, count: Floats, share: Floats | None) -> Floats:
     """Weights (n,) between those of two shares, where the inverse is nearly linear in the share."""
     if share is None or len(tables) == 1:
-        return by_number(tables[0], row, count)
-    out, shares = by_number(tables[0], row, count), np.array(SHARES)
+        return by_number(tables[0], row, count, COUNTS)
+    out, shares = by_number(tables[0], row, count, COUNTS), np.array(SHARES)
     # Parts that bear little besides cones or blossoms may have fewer leaves than any plant has.
     low = np.clip(np.searchsorted(-shares, -share), 1, len(tables) - 1)
     for node in np.unique(low[share != 1.0]).tolist():
         some = np.flatnonzero((low == node) & (share != 1.0))
-        less, more = (1.0 / by_number(tables[i], row[some], count[some]) for i in (node, node - 1))
+        less, more = (1.0 / by_number(tables[i], row[some], count[some], COUNTS) for i in (node, node - 1))
         place = np.maximum(share[some] - shares[node], 0.0) / (shares[node - 1] - shares[node])
         out[some] = 1.0 / (less + place * (more - less))
     return out
-
-
-def by_number(table: NDArray[np.floating], row: Integers, count: Floats, counts: NDArray = COUNTS) -> Floats:
-    """Weights (n,) of rows (n,) of a table (r, k) for ``counts`` (k,) of facets, for numbers of facets (n,) between."""
-    place = np.log(np.maximum(count, 1e-12) / counts[0]) / np.log(counts[1] / counts[0])
-    place = np.clip(place, 0.0, len(counts) - 1.0)
-    low = np.minimum(place.astype(np.int64), len(counts) - 2)
-    return table[row, low] + (place - low) * (table[row, low + 1] - table[row, low])
 
 
 #: Weights (2, r, k) of other species by digest: a scene is compiled anew for each refinement.

@@ -18,8 +18,7 @@ import numpy as np
 
 from ..arrays import Arrays, Floats, Integers, column
 from ..camera.camera import Camera, to_eye
-from ..compiled.flora import Flora
-from ..compiled.placed import extents
+from ..compiled.flora import Flora, extents
 from ..growth.seeds import Branches
 from ..refinement.lights import Light
 

@@ -3,7 +3,8 @@
 """Microsurfaces: few facets that stand for the many surfaces of what is not made explicit (paper, sections 1 and 7).
 
 Each facet takes its place, orientation and color from a leaf or branch that the compiled species expects in the
-sub-plant. Facets are about as large as a pixel; on average they keep the area and orientation of the plants.
+sub-plant, or from a sample on the faces of an asset. Facets are about as large as a pixel; on average they keep the
+area and orientation of the plants.
 
 Each lies in a plane of the faces of leaves, drawn in proportion to their areas: a leaf that is folded along its midrib
 shows less to the sky than a flat one and scatters more light aside, and a spray of needles has no plane at all. Facets
@@ -18,8 +19,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays import GOLDEN_ANGLE, Arrays, Floats, Integers, Keys, gathered, perpendicular, products, spread, unit
-from ..compiled.flora import Flora
-from ..compiled.placed import placed_samples
+from ..assets.asset import COUNTS
+from ..compiled.flora import Flora, placed_samples
 from ..compiled.samples import Points
 from ..growth.axes import axes
 from ..growth.foliage import leaf_start, outwardness, place_leaves, settled, youth
@@ -28,8 +29,9 @@ from ..growth.hashing import Draw, child_key, mix, signed, uniform
 from ..growth.seasons import AREA, PRESENT, leaf_colors_at, leaf_stages, mean_leaf_colors
 from ..growth.seeds import Branches
 from ..growth.wind import moment
-from ..optics import GLOSS, cluster_color
-from ..refinement.contents import piece_leaves
+from ..optics import GLOSS, cluster_color, recollision_albedo
+from ..refinement.contents import Totals, piece_leaves
+from ..refinement.shared_parts import AssetParts, PlacedAssets
 from ..subplants.pieces import Pieces, Thin, wood_areas
 from .hotspots import LightRatios
 
@@ -504,3 +506,96 @@ def _planes_of(flora: Flora, species: int, kind: int) -> Floats:
     length = np.linalg.norm(along, axis=1, keepdims=True)
     along = np.where(length > 1e-6, along / np.maximum(length, 1e-6), perpendicular(normal))
     return np.stack([np.cross(along, normal), along, normal], axis=2)
+
+
+def by_number(table: NDArray[np.floating], row: Integers, count: Floats, counts: Floats) -> Floats:
+    """Weights (n,) of rows (n,) of a table (r, k) for ``counts`` (k,) of facets, for numbers of facets (n,) between."""
+    place = np.log(np.maximum(count, 1e-12) / counts[0]) / np.log(counts[1] / counts[0])
+    place = np.clip(place, 0.0, len(counts) - 1.0)
+    low = np.minimum(place.astype(np.int64), len(counts) - 2)
+    return table[row, low] + (place - low) * (table[row, low + 1] - table[row, low])
+
+
+#: Child indices of facets of leaves and of wood start here; draws of their numbers, turns and places.
+_ASSET_LEAF_PATH, _ASSET_WOOD_PATH = 1 << 42, 1 << 43
+_ASSET_LEAF_COUNT, _ASSET_WOOD_COUNT, _ASSET_TURN, _ASSET_MOVE = 252, 253, 254, 255
+#: Sides of a facet by which one is moved that has the sample of another.
+_ASSET_MOVED = 1.5
+
+
+def facet_totals(placed: PlacedAssets, parts: AssetParts) -> Totals:
+    """Totals (n,) of clusters, with closed leaves as if they were sheets: half of each is never seen."""
+    totals, closed_leaves = parts.totals, placed.closed_leaves(parts)
+    return replace(totals, leaf_area=totals.leaf_area + closed_leaves / 2, wood_area=totals.wood_area - closed_leaves)
+
+
+def asset_weights(placed: PlacedAssets, parts: AssetParts, number: Floats) -> Floats:
+    """Fraction (n,) of their area that facets of clusters (n,) get, of which there are so many (n,) each."""
+    return by_number(placed.assets.clusters.weights, parts.cluster, number, COUNTS)
+
+
+def facets_of_assets(
+    placed: PlacedAssets, parts: AssetParts, totals: Totals, leaf: Floats, wood: Floats, left_out: Floats | None = None
+) -> Facets:
+    """Facets of clusters (n,) with `facet_totals`, of sides for leaves and for wood (n,), meters.
+
+    A fraction (n,) of them is left out.
+    """
+    weight = asset_weights(placed, parts, totals.optical_area / np.maximum(leaf, 1e-12) ** 2)
+    key = placed.keys(parts)
+    kinds = (
+        (True, totals.leaf_area, leaf, _ASSET_LEAF_PATH, _ASSET_LEAF_COUNT),
+        (False, totals.wood_area / 2, wood, _ASSET_WOOD_PATH, _ASSET_WOOD_COUNT),
+    )
+    made = []
+    for leafy, area, side, path, draw in kinds:
+        owner, index, own, one = facet_numbers(key, area, side**2, path, draw, left_out)
+        made.append(_placed(placed, parts, key, leafy, owner, index, own, np.sqrt(one * weight[owner]), weight[owner]))
+    return Facets.concatenate(made)
+
+
+def _placed(
+    placed: PlacedAssets,
+    parts: AssetParts,
+    part_key: NDArray[np.uint64],
+    leafy: bool,
+    owner: Integers,
+    index: Integers,
+    key: NDArray[np.uint64],
+    side: Floats,
+    weight: Floats,
+) -> Facets:
+    """Facets (m,) of clusters: each at a sample, turned about its normal as may be."""
+    samples, clusters = placed.assets.samples, placed.assets.clusters
+    pick = placed.picked(parts, part_key, leafy, owner, index)
+    instance = parts.instance[owner]
+    center = placed.to_world(samples.position[pick], instance)
+    local = samples.normal[pick].astype(np.float64)
+    linear, some = placed.instances.linear, placed.stretched[instance]
+    normal = np.zeros_like(center)
+    for i in range(3):
+        for k in range(3):
+            normal[:, i] += linear[instance, i, k] * local[:, k]
+    if some.any():
+        at = np.flatnonzero(some)
+        normal[at] = np.einsum("nij,nj->ni", placed.cofactors(instance[at]), local[at])
+        # Faces of one cluster grow by different factors, and so do their facets.
+        cluster = parts.cluster[owner[at]]
+        mean = parts.totals.area[owner[at]] / (clusters.leaf_area[cluster] + clusters.wood_area[cluster])
+        side = side.copy()
+        side[at] *= np.sqrt(np.linalg.norm(normal[at], axis=1) / mean)
+    normal = unit(normal)
+    across = perpendicular(normal)
+    turn = 2 * np.pi * uniform(key, _ASSET_TURN)[:, None]
+    across = np.cos(turn) * across + np.sin(turn) * np.cross(normal, across)
+    along = np.cross(normal, across)
+    # Where there are more facets than samples, none may lie upon another.
+    number = (clusters.leaf_samples if leafy else clusters.wood_samples)[parts.cluster]
+    again = np.flatnonzero(index >= number[owner])
+    if len(again):
+        for axis, by in ((across, _ASSET_MOVE), (along, _ASSET_MOVE + 1)):
+            center[again] += (_ASSET_MOVED * side[again] * signed(key[again], by))[:, None] * axis[again]
+    color = recollision_albedo(samples.color[pick].astype(np.float64), weight)
+    through, rough = (own[pick].astype(np.float64) for own in (samples.transmission, samples.roughness))
+    dull = 1.0 - np.clip(weight, 0.0, 1.0)
+    return Facets(center, across, along, side, color, through, roughness=rough, dull=dull)

@@ -19,8 +19,7 @@ from numpy.typing import NDArray
 
 from ..arrays import Arrays, Chunks, Floats, Integers, Integers32, Mask, chunks, column, nested
 from ..camera.camera import Camera
-from ..compiled.flora import Flora
-from ..compiled.placed import bounds, extents
+from ..compiled.flora import Flora, bounds, extents
 from ..growth.foliage import are_solids, envelope_reach
 from ..growth.growth import fullness
 from ..growth.seasons import AREA, PRESENT

@@ -43,7 +43,7 @@ class Surface:
     #: opaque.
     transmission: Floats
     coverage: Floats
-    solid: Mask  # (f,): the face belongs to a nearly closed surface, of which half is never seen; see `mesh_features`
+    solid: Mask  # (f,): the face belongs to a nearly closed surface, of which half is never seen; see `assets.patches`
     #: (f,): the face is a good part of one of many similar things, such as leaves; several may be drawn as one.
     leaf: Mask
     width: Floats  # (f,): width of the feature that the face belongs to, in the mesh's own units

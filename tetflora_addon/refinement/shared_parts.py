@@ -36,8 +36,7 @@ from ..arrays import (
 )
 from ..assets.asset import AssetTable, Instances
 from ..camera.camera import Camera
-from ..compiled.flora import Flora
-from ..compiled.placed import placed_samples
+from ..compiled.flora import Flora, placed_samples
 from ..compiled.samples import Points
 from ..growth.axes import Axes, axes
 from ..growth.foliage import are_solids, leaf_keys, leaf_sites, leaf_start

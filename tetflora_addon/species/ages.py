@@ -20,11 +20,10 @@ from typing import Any
 
 import numpy as np
 
-from .growing import Ages, NodeLaw, Nodes, PartGrown, rounded_least
+from .catalog import LENGTH_HIGH, ORDER_KEYS
 from .members import expected_leaf_area
-from .schema import LENGTH_HIGH, ORDER_KEYS
 from .skeletons import Skeleton
-from .species import Color, Dead, Order, Range, Species
+from .species import Ages, Color, Dead, NodeLaw, Nodes, Order, PartGrown, Range, Species, rounded_least
 
 #: What full habit does. Norway spruces in Swiss stands (Burger 1953, 153 trees) have, against one that stands free,
 #: half of the stem bare, crowns of less than half the width, and 2.2 times the height for their diameter.

@@ -13,8 +13,21 @@ import numpy as np
 
 from ..arrays import Floats
 from ..leaves.models import LeafModel
-from .growing import EVEN, faded, shortened, some_nodes
-from .species import CROWN_PROFILES, LEAF_KINDS, Dead, Order, Range, Species, crown_ratio, fork_cuts, whole_cuts
+from .species import (
+    CROWN_PROFILES,
+    EVEN,
+    LEAF_KINDS,
+    Dead,
+    Order,
+    Range,
+    Species,
+    crown_ratio,
+    faded,
+    fork_cuts,
+    shortened,
+    some_nodes,
+    whole_cuts,
+)
 
 
 @dataclass(frozen=True)

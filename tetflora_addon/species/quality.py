@@ -18,8 +18,8 @@ import numpy as np
 
 from ..errors import SpeciesError
 from ..leaves.models import LeafModel
+from .catalog import MAX_POLYGONS, ORDER_KEYS
 from .members import Members, expected_members, expected_polygons
-from .schema import MAX_POLYGONS, ORDER_KEYS
 from .species import LEAF_KINDS, QUALITY_LIMITS, Order, Range, Species
 
 _FEW = 12.0  # a kind with no more members than this keeps them all
@@ -59,7 +59,7 @@ def with_quality(species: Species, quality: float) -> Species:
     Raises
     ------
     SpeciesError
-        The quality is out of range or not finite, or a plant would have more than `schema.MAX_POLYGONS` polygons.
+        The quality is out of range or not finite, or a plant would have more than `catalog.MAX_POLYGONS` polygons.
 
     Notes
     -----

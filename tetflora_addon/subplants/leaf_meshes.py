@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Leaves as polygons: copies of the species' leaf models, written straight into the arrays of their mesh.
 
-See section 5 of the paper. What is small in the image may be a kite, see `leaves.kites`; what is large
+See section 5 of the paper. What is small in the image may be a kite, see `leaves.levels`; what is large
 has finer levels, see `leaves.levels`.
 
 Meshes of copies of a leaf model, written straight into the arrays of the mesh.
@@ -34,8 +34,7 @@ from ..growth.hashing import Draw, uniform
 from ..growth.seasons import is_seasonal, leaf_colors
 from ..growth.seeds import Branches
 from ..growth.wind import moment
-from ..leaves.kites import KITE, LeafKites, leaf_kites, leaf_planes
-from ..leaves.levels import LeafLevel, chosen_level, hidden_gloss, leaf_levels
+from ..leaves.levels import KITE, LeafKites, LeafLevel, chosen_level, hidden_gloss, leaf_kites, leaf_levels, leaf_planes
 from ..leaves.models import LeafModel
 from .pieces import Thin
 

@@ -23,8 +23,7 @@ from numpy.typing import NDArray
 
 from ..arrays import Arrays, Floats, Floats32, Integers, Keys, Mask, Table, cross, dot, smoothstep, spread, unit
 from ..compiled.averages import tube_perimeter
-from ..compiled.flora import Flora
-from ..compiled.placed import bounds
+from ..compiled.flora import Flora, bounds
 from ..growth.axes import Axes
 from ..growth.foliage import leaf_keys, leaf_places, place_leaves
 from ..growth.growth import WholeBranches, branch_counts, leaf_counts, radius_at

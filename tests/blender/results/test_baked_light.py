@@ -16,8 +16,8 @@ from tetflora_addon.blender import compat
 from tetflora_addon.blender.job import refine
 from tetflora_addon.blender.materials import materials, nodes
 from tetflora_addon.blender.scene import lights
-from tetflora_addon.emission.light import baked_attributes
 from tetflora_addon.light import scattering, sources
+from tetflora_addon.light.illumination import baked_attributes
 
 pytestmark = pytest.mark.usefixtures("clean_file")
 UP = np.array([[0.0, 0.0, 1.0]])

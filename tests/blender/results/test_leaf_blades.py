@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from tetflora_addon.blender.results import leaf_objects
-from tetflora_addon.leaves import blades, models, outlines
+from tetflora_addon.leaves import models, outlines, surfaces
 from tetflora_addon.species import catalog
 
 pytestmark = pytest.mark.usefixtures("clean_file")
@@ -46,7 +46,7 @@ def test_outlines_and_far_polygons_agree(identifier):
 
 
 def test_compound_leaves_have_the_blade_of_their_leaflets():
-    shape = blades.Compound(leaflet=outlines.Blade(width=0.4))
+    shape = surfaces.Compound(leaflet=outlines.Blade(width=0.4))
     model = replace(catalog.load_species("rowan").leaf[0], shape=shape)
     assert leaf_objects.blade_kind(model, 0.4) == "pinnate"
 

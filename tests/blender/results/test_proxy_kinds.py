@@ -15,7 +15,7 @@ from tetflora_addon.blender.materials import materials
 from tetflora_addon.blender.results import proxy_kinds
 from tetflora_addon.buffers import MeshBuffers
 from tetflora_addon.emission.emitters import ProxyEmitter
-from tetflora_addon.emission.light import baked_attributes
+from tetflora_addon.light.illumination import baked_attributes
 from tetflora_addon.refinement.decisions import Decision
 
 TOY, NUMBER = 'TRIANGLES', 1700

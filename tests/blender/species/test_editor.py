@@ -20,7 +20,7 @@ from tetflora_addon.blender.job import contents
 from tetflora_addon.blender.species import edits
 from tetflora_addon.blender.species.catalog import OWN_FILES, load_species_file
 from tetflora_addon.blender.species.editor import set_species_value
-from tetflora_addon.species import catalog, schema, skeletons
+from tetflora_addon.species import catalog, skeletons
 
 pytestmark = pytest.mark.usefixtures("clean_file")
 
@@ -48,7 +48,7 @@ def own_folder(tmp_path):
 
 
 def test_every_key_of_an_order_has_its_sliders_with_limits_and_tooltip():
-    keys = schema.ORDER_KEYS
+    keys = catalog.ORDER_KEYS
     properties = _editor().bl_rna.properties
     for name, key in keys.items():
         assert name in properties, name
@@ -67,7 +67,7 @@ def test_sliders_show_what_the_species_has(identifier):
     species = _shipped(identifier)
     for index, order in enumerate(species.orders):
         editor = _editor(identifier, index)
-        for name, key in schema.ORDER_KEYS.items():
+        for name, key in catalog.ORDER_KEYS.items():
             shown, value = getattr(editor, name), getattr(order, name)
             if key.kind == "range":
                 shown, value = tuple(shown), tuple(value)
@@ -95,14 +95,14 @@ def test_a_range_takes_no_mean_and_no_variation_beyond_its_own_limits():
 
 def test_looking_stores_nothing():
     editor = _editor("conifer", 1)
-    for name in schema.ORDER_KEYS:
+    for name in catalog.ORDER_KEYS:
         getattr(editor, name)
     assert len(bpy.context.scene.tetflora.species_edits) == 0
     assert _edited("conifer") == _shipped("conifer")
 
 
 def test_every_slider_changes_its_own_value_and_no_other():
-    keys = schema.ORDER_KEYS
+    keys = catalog.ORDER_KEYS
     last = len(_shipped().orders) - 1
     for name, key in keys.items():
         if name == "branches":

@@ -11,7 +11,7 @@ from benchmarks.leaf_area import drawn_leaves
 from devtools.leaf_area import allometry
 from tetflora_addon.growth.hashing import key_of_seed
 from tetflora_addon.species.catalog import load_species
-from tetflora_addon.stands.change import Plants, newcomers
+from tetflora_addon.stands.grow import Plants, newcomers
 from tetflora_addon.stands.site import StandSite, StandSpecies, StandTraits
 
 

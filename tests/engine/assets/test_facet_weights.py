@@ -54,8 +54,8 @@ def test_leaves_that_lie_in_a_heap_take_no_longer(monkeypatch: pytest.MonkeyPatc
         return found
 
     monkeypatch.setattr(compiled._View, "met", counted)
-    matrices = np.tile(np.eye(4), (150, 1, 1))
-    heap = trees.source_of(trees.leaves(1, 1), shown=np.zeros(150), matrices=matrices)
+    matrices = np.tile(np.eye(4), (60, 1, 1))
+    heap = trees.source_of(trees.leaves(1, 1), shown=np.zeros(60), matrices=matrices)
     weights = trees.compile_asset(heap).clusters.weights[0]
     assert max(most) <= 2 * compiled.RAYS**2
     assert weights[0] == pytest.approx(0.1)

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 
 from tests.engine.refinement.test_polygons import SEEDS, surface, thicket
-from tetflora_addon.assets.mesh_features import mesh_features
+from tetflora_addon.assets.patches import mesh_features
 from tetflora_addon.growth.hashing import mix
 
 

@@ -193,7 +193,7 @@ def test_what_artists_type_in_lies_on_no_border(angles, place):
 def test_a_walk_goes_through_few_cells():
     camera = Camera("PERSP", np.zeros(3), LEVEL, (-0.36, 0.36, -0.2025, 0.2025), 0.1, 100.0, 1920, 1080)
     length = 100.0
-    walk = [replace(camera, position=np.array([0.3, y, 1.7])) for y in np.arange(0.0, length, 0.05)]
+    walk = [replace(camera, position=np.array([0.3, y, 1.7])) for y in np.arange(0.0, length, 0.15)]
     cells = [cell_camera(c, CELLS) for c in walk]
     changes = sum(not same(a, b) for a, b in itertools.pairwise(cells))
     # Along the way, and where it is not quite the lattice's direction now and then across it.
@@ -208,7 +208,7 @@ def changes(cameras: list[Camera], around: Around | None) -> int:
 
 def test_far_from_all_things_a_flight_goes_through_fewer_cells():
     camera = Camera("PERSP", np.zeros(3), LEVEL, (-0.36, 0.36, -0.2025, 0.2025), 0.1, 1000.0, 1920, 1080)
-    flight = [replace(camera, position=np.array([0.3, y, 60.0])) for y in np.arange(0.0, 400.0, 0.6)]
+    flight = [replace(camera, position=np.array([0.3, y, 60.0])) for y in np.arange(0.0, 400.0, 1.5)]
     ground = np.stack(np.meshgrid(np.arange(-100.0, 100.0, 10.0), np.arange(-100.0, 500.0, 10.0), 0.0), -1)
     low, high = (Around(ground.reshape(-1, 3), np.full(ground.size // 3, height)) for height in (10.0, 55.0))
     assert changes(flight, low) <= changes(flight, None) / 2

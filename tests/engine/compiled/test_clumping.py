@@ -14,9 +14,18 @@ from numpy.typing import NDArray
 
 from tests.engine import support
 from tetflora_addon.buffers import MeshBuffers
-from tetflora_addon.compiled.clumping import LEAST, MOST, Clumping, factors
+from tetflora_addon.compiled.clumping import (
+    LEAST,
+    MOST,
+    Clumping,
+    basis,
+    cell_numbers,
+    covered,
+    elements_of,
+    factors,
+    path_lengths,
+)
 from tetflora_addon.compiled.flora import Flora
-from tetflora_addon.compiled.rays import basis, cell_numbers, covered, elements_of, path_lengths
 from tetflora_addon.growth.growth import trunks
 from tetflora_addon.growth.seeds import Seeds
 from tetflora_addon.proxies.summaries import Summaries, extinction_matrices, summarize
@@ -92,8 +101,8 @@ def test_nothing_covers_nothing() -> None:
 @pytest.mark.parametrize("identifier", ["oak", "birch", "conifer", "fern", "bush", "maple"])
 def test_what_rays_meet_is_the_extinction_of_the_moment(identifier: str) -> None:
     """Rays meet a leaf once and a closed tube twice: Σ A |ω·n| with weights 1 and ½, which √(ωᵀSω) gives back."""
-    flora, rng = support.lean(), np.random.default_rng(7)
-    _, pieces = support.grown(flora, support.plants(3, support.SPECIES.index(identifier)))
+    flora, rng = support.alone(identifier, support.FEW_POLYGONS), np.random.default_rng(7)
+    _, pieces = support.grown(flora, support.plants(3))
     tubes, leaves = support.meshes(flora, pieces)
     parts = [(m, w) for meshes, w in ((leaves, 1.0), (tubes, 0.5)) for m in meshes]
     areas = [w * support.face_areas(m).sum() for m, w in parts]

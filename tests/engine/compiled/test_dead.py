@@ -16,9 +16,9 @@ from tetflora_addon.errors import SpeciesError
 from tetflora_addon.growth.growth import WholeBranches
 from tetflora_addon.growth.rows import DEAD_ORDER
 from tetflora_addon.species.ages import with_habit
+from tetflora_addon.species.catalog import species_from_dict
 from tetflora_addon.species.members import expected_members, expected_polygons
 from tetflora_addon.species.quality import with_quality
-from tetflora_addon.species.schema import species_from_dict
 from tetflora_addon.subplants.pieces import expand, wood_areas
 
 _DEAD = {"number": [6, 2], "from": 0.3, "into": 0.2, "on_limbs": [1.5, 1]}

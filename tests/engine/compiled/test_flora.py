@@ -45,7 +45,7 @@ def samples_of_plants(species: int, count: int) -> dict[str, np.ndarray]:
 def test_averages_are_those_of_grown_plants(species: int) -> None:
     """Within four standard errors; the wood as a ratio, for it depends on the trunk's size."""
     flora = support.lean()
-    found = samples_of_plants(species, min(120, int(5e5 / flora.polygons[flora.first_row[species]])))
+    found = samples_of_plants(species, min(60, int(2e5 / flora.polygons[flora.first_row[species]])))
     row = flora.first_row[species]
     for name in ("leaf_count", "leaf_area", "polygons"):
         expected, values = flora.area_nodes[row, 0] if name == "leaf_area" else getattr(flora, name)[row], found[name]
@@ -104,12 +104,12 @@ def test_colors_are_means_weighted_by_area() -> None:
         np.testing.assert_allclose(areas @ colors / areas.sum(), expected, rtol=0.03)
 
 
-@pytest.mark.parametrize("species", [support.SPECIES.index(name) for name in support.DENSE], ids=support.DENSE)
-def test_orientation_of_whole_plants(species: int) -> None:
-    flora = support.lean()
+@pytest.mark.parametrize("name", support.DENSE)
+def test_orientation_of_whole_plants(name: str) -> None:
+    flora = support.alone(name, support.FEW_POLYGONS)
     # A hundred thousand polygons or two settle the mean: of what has as many branches as that, six plants.
-    number = int(np.clip(1.5e5 / flora.polygons[flora.first_row[species]], 6, 12))
-    trunk, pieces = support.grown(flora, support.plants(np.arange(number), species))
+    number = int(np.clip(1.5e5 / flora.polygons[0], 6, 12))
+    trunk, pieces = support.grown(flora, support.plants(np.arange(number)))
     tubes, leaves = support.meshes(flora, pieces)
     expected = leaf_moments(flora.orientation, trunk).mean(axis=0)
     assert np.trace(expected) == pytest.approx(1)
@@ -117,11 +117,11 @@ def test_orientation_of_whole_plants(species: int) -> None:
     np.testing.assert_allclose(support.moment(tubes[0]), wood_moments(flora.orientation, trunk).mean(axis=0), atol=0.03)
 
 
-@pytest.mark.parametrize("species", [support.SPECIES.index(name) for name in support.DENSE], ids=support.DENSE)
-def test_orientation_of_subplants_at_any_tilt(species: int) -> None:
+@pytest.mark.parametrize("name", support.DENSE)
+def test_orientation_of_subplants_at_any_tilt(name: str) -> None:
     """Boughs of many plants, sorted by how steeply they stand, each group against what their axes foretell."""
-    flora = support.lean()
-    trunk = support.trunks(flora.rows, support.plants(np.arange(8), species))
+    flora = support.alone(name, support.FEW_POLYGONS)
+    trunk = support.trunks(flora.rows, support.plants(np.arange(8)))
     boughs, *_ = open_subplants(flora, trunk)
     steepness = np.argsort(boughs.frame[:, 2, 2])
     for group in np.array_split(steepness, 3):
@@ -138,10 +138,9 @@ def test_orientation_of_standing_plants_to_a_hundredth(name: str) -> None:
 
     None bears fruit, of which less shows than its faces have.
     """
-    flora = support.lean()
-    species = support.SPECIES.index(name)
-    number = int(np.clip(1e6 / flora.polygons[flora.first_row[species]], 4, 60))
-    boughs, *_ = open_subplants(flora, support.trunks(flora.rows, support.plants(np.arange(number), species)))
+    flora = support.alone(name)
+    number = int(np.clip(5e5 / flora.polygons[0], 4, 60))
+    boughs, *_ = open_subplants(flora, support.trunks(flora.rows, support.plants(np.arange(number))))
     _, leaves = support.meshes(flora, support.expanded(flora, boughs))
     weight = subplant_totals(flora, boughs).leaf_area
     expected = np.einsum("n,nij->ij", weight, leaf_moments(flora.orientation, boughs)) / weight.sum()
@@ -152,9 +151,8 @@ def test_orientation_of_standing_plants_to_a_hundredth(name: str) -> None:
 @pytest.mark.parametrize("name", ["beech", "birch", "bush", "fern", "palm", "willow"])
 def test_orientation_of_branches_turned_any_way(name: str) -> None:
     """Leafy branches turned as no plant of the species has them, sorted by how steeply they stand then."""
-    flora = support.lean()
-    species = support.SPECIES.index(name)
-    some = support.trunks(flora.rows, support.plants(np.arange(100 if name in ("fern", "palm") else 4), species))
+    flora = support.alone(name)
+    some = support.trunks(flora.rows, support.plants(np.arange(100 if name in ("fern", "palm") else 4)))
     while flora.leaf_count[some.row].mean() > 200:
         some, *_ = open_subplants(flora, some)
     random = np.random.default_rng(5)
@@ -176,13 +174,11 @@ def sample_positions(points: Points, subplants: Branches) -> np.ndarray:
     return points.position[first[0] : first[0] + number[0]]
 
 
-@pytest.mark.parametrize("species", [support.SPECIES.index(name) for name in support.DENSE], ids=support.DENSE)
-def test_sample_points_lie_where_leaves_and_wood_are(species: int) -> None:
+@pytest.mark.parametrize("name", support.DENSE)
+def test_sample_points_lie_where_leaves_and_wood_are(name: str) -> None:
     """Mean and spread of height and distance from the trunk, in units of its length."""
-    flora = support.lean()
-    row = flora.first_row[species]
-    number = int(5e5 / flora.polygons[row])
-    trunk, pieces = support.grown(flora, support.plants(np.arange(number), species))
+    flora = support.alone(name, support.FEW_POLYGONS)
+    trunk, pieces = support.grown(flora, support.plants(np.arange(int(5e5 / flora.polygons[0]))))
     tips = pieces.take(pieces.t1 == 1)
     owner, position, size = support.leaves_of(flora, tips.branches)
     middle = (pieces.start + pieces.end) / 2

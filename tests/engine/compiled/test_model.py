@@ -80,7 +80,7 @@ def test_totals_are_kept_when_subplants_are_opened(level: int) -> None:
 
 
 @given(st.integers(0, 10**6), st.lists(st.floats(0.01, 0.99), min_size=1, max_size=5))
-@settings(deadline=None, max_examples=30)
+@settings(deadline=None, max_examples=15)
 def test_totals_of_pieces_add_up_exactly(seed: int, cuts: list[float]) -> None:
     flora = rich()
     _, pieces = support.grown(flora, support.plants(seed))

@@ -27,8 +27,7 @@ from tests.engine.support import (
     whole_of,
 )
 from tetflora_addon.arrays import spread
-from tetflora_addon.compiled.flora import Flora, compile_species
-from tetflora_addon.compiled.placed import extents, placed_samples
+from tetflora_addon.compiled.flora import Flora, compile_species, extents, placed_samples
 from tetflora_addon.compiled.sizes import fitted, measured
 from tetflora_addon.growth.growth import leaf_counts, trunks
 from tetflora_addon.growth.seasons import Season

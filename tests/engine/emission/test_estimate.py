@@ -14,8 +14,8 @@ from tetflora_addon.camera.camera import Camera
 from tetflora_addon.compiled.flora import compile_species
 from tetflora_addon.compiled.sizes import Crown, CrownParts, crown_of
 from tetflora_addon.emission import budget
+from tetflora_addon.emission.budget import Stand, estimate, expanded_faces
 from tetflora_addon.emission.drawing import LIT_LEAVES, Parts, drawing, drawn_blocks
-from tetflora_addon.emission.estimate import Stand, estimate, expanded_faces
 from tetflora_addon.emission.plants import Transition
 from tetflora_addon.jobs import run_to_end
 from tetflora_addon.proxies.facet_weights import facet_weights
@@ -114,7 +114,7 @@ def _seeds(name):
 @pytest.mark.parametrize("name", SCENES)
 def test_as_many_are_made(name, monkeypatch):
     """Within one and a half, in a small picture with facets of the size that they have in a large one."""
-    monkeypatch.setattr(budget, "NEVER_TOO_MANY", 0.01 * budget.NEVER_TOO_MANY)
+    monkeypatch.setattr(budget, "PLENTY", 0.01 * budget.PLENTY)
     flora, seeds, camera, stand = _seeds(name)
     result = run_to_end(refine(flora, seeds, camera, SETTINGS))
     detail = budget.fit_to_budget(result, camera, SETTINGS)

@@ -18,13 +18,13 @@ from tests.engine.test_figures import rich
 from tetflora_addon.camera.camera import Camera
 from tetflora_addon.compiled.flora import Flora, compile_species
 from tetflora_addon.compiled.sizes import crown_of
-from tetflora_addon.emission.estimate import Stand, estimate
+from tetflora_addon.emission.budget import Stand, estimate
 from tetflora_addon.jobs import run_to_end
 from tetflora_addon.preview.levels import colors_of, gather, thinned
 from tetflora_addon.preview.light_plants import bounds_of_plants, crowns_of, light_plants
 from tetflora_addon.refinement.loop import refine
 from tetflora_addon.refinement.settings import RefinementSettings
-from tetflora_addon.species.schema import species_from_dict
+from tetflora_addon.species.catalog import species_from_dict
 from tetflora_addon.species.species import Species
 
 #: By which part of itself a sum may differ: on the border between two decisions machines round otherwise.

@@ -93,8 +93,7 @@ def test_facets_do_not_depend_on_how_space_is_divided() -> None:
 @pytest.mark.parametrize("seed", range(4))
 def test_a_trunk_that_fills_the_picture_is_there(seed: int) -> None:
     """Hardly any of a tall birch is seen from so near: whatever share of the plant its trunk has, it is a tube."""
-    flora = support.flora()
-    seeds = support.plants([seed], support.SPECIES.index("birch"))
+    flora, seeds = support.alone("birch"), support.plants([seed])
     radius = float(trunks(flora.rows, seeds).radius[0])
     camera = support.camera((0.0, -8.0 * radius, 1.3), (0.0, 0.0, 1.3), pixels=256)
     blocks, _, _ = support.drawn(flora, run(flora, seeds, camera)[1], camera, 1.0, 0.5)

@@ -15,7 +15,7 @@ from tetflora_addon.compiled.flora import Flora, compile_species
 from tetflora_addon.errors import SpeciesError
 from tetflora_addon.growth.rows import MAX_DRAWN, MAX_SEGMENTS, drawn_lines
 from tetflora_addon.refinement.contents import subplant_totals
-from tetflora_addon.species.schema import species_from_dict
+from tetflora_addon.species.catalog import species_from_dict
 from tetflora_addon.species.skeletons import Skeleton, drawn_branches, skeleton_from_edges
 from tetflora_addon.subplants.pieces import open_subplants, wood_areas
 

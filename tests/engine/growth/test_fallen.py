@@ -10,9 +10,8 @@ from hypothesis import strategies as st
 
 from tests.engine import support
 from tetflora_addon.growth.seasons import Season, is_gone
-from tetflora_addon.species.catalog import builtin_folder, load_species
+from tetflora_addon.species.catalog import builtin_folder, load_species, species_from_dict
 from tetflora_addon.species.litter import leaves_page
-from tetflora_addon.species.schema import species_from_dict
 
 OAK = species_from_dict(
     json.loads(

@@ -20,9 +20,8 @@ from tetflora_addon.growth.rows import DEAD_ORDER
 from tetflora_addon.growth.seeds import Branches
 from tetflora_addon.refinement.contents import subplant_totals
 from tetflora_addon.species.ages import with_age
-from tetflora_addon.species.growing import Ages, NodeLaw
-from tetflora_addon.species.schema import species_from_dict
-from tetflora_addon.species.species import Species
+from tetflora_addon.species.catalog import species_from_dict
+from tetflora_addon.species.species import Ages, NodeLaw, Species
 from tetflora_addon.subplants.pieces import wood_areas
 
 AGE = {"full": 40, "height": [0.04, 1.2], "diameter": [0.03, 1.3], "lifespan": 160, "flowers": 8}
@@ -139,7 +138,7 @@ def test_numbers_of_children_are_as_expected(years: float, sort: int) -> None:
 
 
 @given(years=st.floats(0.2, 200), seed=st.integers(0, 1000))
-@settings(deadline=None, max_examples=8)
+@settings(deadline=None, max_examples=4)
 def test_every_vertex_is_inside_the_bound(years: float, seed: int) -> None:
     flora = at_age(rich(), years)
     trunk = support.trunks(flora.rows, support.plants(np.arange(seed, seed + 2)))

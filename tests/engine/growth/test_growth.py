@@ -78,7 +78,7 @@ def test_a_subplant_alone_is_the_same_as_inside_the_whole(species: int, seed: in
 
 
 @given(st.lists(seeds_, min_size=2, max_size=6, unique=True), st.randoms(use_true_random=False))
-@settings(deadline=None, max_examples=20)
+@settings(deadline=None, max_examples=10)
 def test_order_of_plants_does_not_matter(seeds: list[int], random: Any) -> None:
     flora = support.lean()
     kinds = np.array([random.randrange(len(support.SPECIES)) for _ in seeds])

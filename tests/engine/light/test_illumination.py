@@ -12,10 +12,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tests.engine import support
-from tetflora_addon.emission.light import shadow_steps
 from tetflora_addon.emission.shells import set_apart
 from tetflora_addon.light import buffers
-from tetflora_addon.light.illumination import Illumination
+from tetflora_addon.light.illumination import Illumination, shadow_steps
 from tetflora_addon.light.receivers import MediumCells, SurfaceElements
 from tetflora_addon.light.scattering import (
     DIRECTIONS,
@@ -92,7 +91,7 @@ def test_a_slab_lets_through_what_it_must(kappa: float, cells: int) -> None:
     # Not at the sides, where a pixel is half full.
     keep = np.abs(points[:, :2]).max(axis=1) < 1.9
     points, owner = points[keep], owner[keep]
-    found = shadow_pass(cloud, [SUN], DARK, resolution=96)
+    found = shadow_pass(cloud, [SUN], DARK, resolution=96, orders=1)
     wanted = np.exp(kappa * points[:, 2])[:, None] * SUN.color
     assert only(found, points, owner) == pytest.approx(wanted, abs=0.02 * 3.0)
     below = np.array([[0.3, -0.4, -9.0], [1.0, 1.0, -4.1]])
@@ -108,8 +107,8 @@ def test_lamps_inside_and_outside_agree_with_the_chord(kind: str) -> None:
     points, owner = inside(2, 200, cloud)
     keep = np.abs(points[:, :2]).max(axis=1) < 1.0
     points, owner = points[keep], owner[keep]
-    found = shadow_pass(cloud, [lamp], DARK, resolution=256)
-    free = only(shadow_pass(box(0.0), [lamp], DARK, resolution=32), points, owner)
+    found = shadow_pass(cloud, [lamp], DARK, resolution=256, orders=1)
+    free = only(shadow_pass(box(0.0), [lamp], DARK, resolution=32, orders=1), points, owner)
     slant = np.linalg.norm(lamp.position - points, axis=1) / (6.0 - points[:, 2])
     wanted = np.exp(0.3 * points[:, 2] * slant)
     assert only(found, points, owner)[:, 0] / free[:, 0] == pytest.approx(wanted, abs=0.02)
@@ -121,7 +120,7 @@ def test_a_lamp_in_the_middle_shines_all_around() -> None:
     points, owner = inside(3, 200, cloud)
     away = np.linalg.norm(points - lamp.position, axis=1)
     keep = away > 0.5
-    found = only(shadow_pass(cloud, [lamp], DARK, resolution=256), points, owner)[:, 0]
+    found = only(shadow_pass(cloud, [lamp], DARK, resolution=256, orders=1), points, owner)[:, 0]
     wanted = np.exp(-0.4 * away) / away**2
     assert (found * away**2)[keep] == pytest.approx((wanted * away**2)[keep], abs=0.04)
 
@@ -130,8 +129,10 @@ def test_polygons_shadow_what_is_behind_them_and_not_themselves() -> None:
     plate = np.array([[[-9, -9, -2.0], [9, -9, -2.0], [0, 18, -2.0]]], float)
     cloud = box(0.1)
     points, owner = inside(4, 300, cloud)
-    found = shadow_pass(cloud, [SUN], DARK, plate, resolution=128)
-    light, free = (only(f, points, owner)[:, 0] for f in (found, shadow_pass(cloud, [SUN], DARK, resolution=128)))
+    found = shadow_pass(cloud, [SUN], DARK, plate, resolution=128, orders=1)
+    light, free = (
+        only(f, points, owner)[:, 0] for f in (found, shadow_pass(cloud, [SUN], DARK, resolution=128, orders=1))
+    )
     assert light[points[:, 2] < -2.2] == pytest.approx(0.0, abs=1e-9)
     assert light[points[:, 2] > -2.0] == pytest.approx(free[points[:, 2] > -2.0])
     on = only(found, np.array([[0.3, 0.2, -2.0]]), np.array([-1]))[0, 0]
@@ -143,7 +144,7 @@ def test_lights_add_and_those_without_shadow_pass_through() -> None:
     points, owner = inside(5, 50, cloud)
     other = Light("SUN", np.zeros(3), np.array([0.6, 0.0, -0.8]), shadow=False)
     one, two, both = (
-        only(shadow_pass(cloud, lights, DARK, resolution=64), points, owner)
+        only(shadow_pass(cloud, lights, DARK, resolution=64, orders=1), points, owner)
         for lights in ([SUN], [other], [SUN, other])
     )
     assert both == pytest.approx(one + two)

@@ -22,7 +22,7 @@ from tetflora_addon.planting.plane import Path, Terrain
 from tetflora_addon.planting.rules import Rules, suggested_distance
 from tetflora_addon.planting.strokes import Brush
 from tetflora_addon.planting.wetness import wet_ground
-from tetflora_addon.stands.change import planted
+from tetflora_addon.stands.grow import planted
 from tetflora_addon.stands.site import StandTraits
 
 #: By which part of itself a sum may differ: on the border between two places machines round otherwise.

@@ -96,7 +96,7 @@ def test_all_leaves_fall_somewhere_and_most_near_the_trunk():
     assert fallen[0, far > 6.0].max() == 0.0
 
 
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=10, deadline=None)
 @given(seed=st.integers(0, 10**6))
 def test_the_order_of_plants_does_not_matter(seed):
     canopy = _wood(seed)

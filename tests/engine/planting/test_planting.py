@@ -108,7 +108,7 @@ RULES = st.builds(
 )
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=30, deadline=None)
 @given(rules=RULES, with_areas=st.booleans(), with_paths=st.booleans(), with_older=st.booleans())
 def test_every_plant_satisfies_every_hard_rule(rules, with_areas, with_paths, with_older):
     rng = np.random.default_rng(rules.seed % 1000)

@@ -269,10 +269,9 @@ def test_a_tree_that_was_not_divided_has_an_order() -> None:
 @pytest.mark.parametrize("species", ["birch", "conifer", "bush"])
 def test_light_plants_stand_where_plants_do(species: str) -> None:
     """Few triangles, within the plant's bound, about as tall as its leaves reach, in the species' color."""
-    number = support.SPECIES.index(species)
-    flora, count = support.flora(), 5
+    flora, count = support.alone(species), 5
     positions = np.random.default_rng(1).uniform(-30, 30, (count, 3))
-    seeds = support.plants(np.arange(count), number, positions, 0.7)
+    seeds = support.plants(np.arange(count), 0, positions, 0.7)
     shapes = light_plants.light_plants(flora, seeds)
     stems = trunks(flora.rows, seeds)
     points = shapes.positions.reshape(count, -1, 3) - stems.position[:, None]

@@ -76,7 +76,7 @@ def test_sums_by_tetrahedron(things: list[tuple]) -> None:
 
 
 def test_bounding_box_holds_all_bounds() -> None:
-    flora = support.flora()
+    flora = support.lean()
     seeds = support.plants(np.arange(6), np.arange(6) % len(support.SPECIES), np.arange(18.0).reshape(6, 3))
     trunk, pieces = support.grown(flora, seeds)
     low, high = bounding_box(flora, trunk)

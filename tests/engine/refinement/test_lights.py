@@ -47,8 +47,7 @@ def refined(result: Refinement) -> np.ndarray:
     return result.decision != Decision.HIDDEN
 
 
-@pytest.mark.parametrize("kind", LIGHTS)
-@pytest.mark.parametrize("anchored", [False, True])
+@pytest.mark.parametrize(("kind", "anchored"), [*((kind, False) for kind in LIGHTS), ("point", True)])
 def test_shadows_that_fall_into_the_image_are_refined(kind: str, anchored: bool) -> None:
     flora, seeds = support.small_flora(), support.plants(np.arange(6), position=BEHIND + ASIDE)
     plain = last(flora, seeds, [LIGHTS[kind]], shadow_cutoff=0.0, anchored=anchored)

@@ -13,7 +13,7 @@ from tetflora_addon.refinement.polygons import Polygons
 
 
 @given(SEEDS)
-@settings(deadline=None, max_examples=20)
+@settings(deadline=None, max_examples=10)
 def test_holdings_give_and_take(seed: int) -> None:
     """Whatever is taken out and put back, in whatever order, everything is there once, with its own totals."""
     tree, held = divided(Polygons.everything(placed(thicket(1), 1)), 1, 0.0)

@@ -116,7 +116,7 @@ def check_points(tree: TetrahedralTree, plants: SharedPlants) -> None:
 
 @pytest.mark.parametrize("kind", FLORAS)
 @given(VIEWS)
-@settings(deadline=None, max_examples=6)
+@settings(deadline=None, max_examples=4)
 def test_nothing_is_lost_or_held_twice(kind: str, view: tuple[int, str]) -> None:
     """Every branch is in one part; points carry all area, each in the tetrahedron that contains it."""
     flora, seeds = FLORAS[kind](), support.grove(4, 2.5)
@@ -166,7 +166,7 @@ def test_opening_keeps_areas_on_average() -> None:
 
 
 @given(VIEWS)
-@settings(deadline=None, max_examples=15)
+@settings(deadline=None, max_examples=8)
 def test_only_what_is_large_beside_its_tetrahedron_is_opened(view: tuple[int, str]) -> None:
     """A sub-plant is opened where a tetrahedron that holds some of it is divided and is not much larger.
 
@@ -271,7 +271,7 @@ QUESTIONS = {
 
 
 @given(VIEWS, st.lists(st.lists(st.sampled_from(sorted(QUESTIONS)), max_size=3), min_size=3, max_size=5))
-@settings(deadline=None, max_examples=8)
+@settings(deadline=None, max_examples=4)
 def test_what_is_asked_on_the_way_changes_nothing(view: tuple[int, str], asked: list[list[str]]) -> None:
     """Each pass changes the same nodes and gives them the same totals, and the same parts and points are left.
 

@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import pytest
 
-from tetflora_addon.refinement.statistics import Statistics
+from tetflora_addon.refinement.loop import Statistics
 
 
 @pytest.mark.parametrize(

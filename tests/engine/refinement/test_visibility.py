@@ -84,7 +84,7 @@ def cast(vertices, extinction, camera, width, height, occluders=None):
     return count * camera.width * camera.height / (width * height), seen / np.maximum(count, 1), alpha
 
 
-def compare(vertices, extinction, rank, camera, resolution, fine=160, triangles=None):
+def compare(vertices, extinction, rank, camera, resolution, fine=112, triangles=None):
     """Measured visibility, and rays at the final image's resolution or coarser."""
     occluders, hidden = None, None
     size = buffer_size(camera, fine)

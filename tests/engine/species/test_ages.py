@@ -17,14 +17,13 @@ from tetflora_addon.compiled.flora import Flora, compile_species
 from tetflora_addon.errors import SpeciesError
 from tetflora_addon.growth.rows import DEAD_ORDER
 from tetflora_addon.species.ages import STAGES, ages_of, stage, with_age
-from tetflora_addon.species.catalog import load_species
-from tetflora_addon.species.growing import grown
+from tetflora_addon.species.catalog import load_species, species_from_dict
 from tetflora_addon.species.members import expected_members, expected_polygons
-from tetflora_addon.species.schema import species_from_dict
+from tetflora_addon.species.species import grown
 
 TREES = [name for name in support.SPECIES if not ages_of(load_species(name)).scaled]
 #: Fractions of the full age, then ages in lifespans.
-TIMES = [0.02, 0.05, 0.12, 0.25, 0.5, 0.8, 1.3, 2.0]
+TIMES = [0.02, 0.12, 0.5, 1.3]
 
 
 def at_age(name: str, years: float) -> Flora:
@@ -47,7 +46,7 @@ def test_every_species_has_every_age(name: str) -> None:
     """Nothing is infinite or negative, and what does not die has leaves or wood."""
     species = load_species(name)
     end = ages_of(species).lifespan
-    for years in (1.0, 5.0, 20.0, 80.0, 0.97 * end, 2.0 * end):
+    for years in (1.0, 20.0, 0.97 * end, 2.0 * end):
         flora = at_age(name, years)
         for key, value in vars(flora).items():
             if isinstance(value, np.ndarray) and value.dtype.kind == "f":

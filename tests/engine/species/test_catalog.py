@@ -16,8 +16,16 @@ from tests.attack import material
 from tests.engine import support
 from tetflora_addon.errors import MESSAGE, NAME, SpeciesError, readable
 from tetflora_addon.species import catalog
-from tetflora_addon.species.catalog import checked_identifier, list_species, load_species, odd_files
-from tetflora_addon.species.schema import MAX_FILE_BYTES, read_species, species_from_dict, species_from_json
+from tetflora_addon.species.catalog import (
+    MAX_FILE_BYTES,
+    checked_identifier,
+    list_species,
+    load_species,
+    odd_files,
+    read_species,
+    species_from_dict,
+    species_from_json,
+)
 
 SHIPPED = set(support.SPECIES)
 

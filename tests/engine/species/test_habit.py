@@ -17,8 +17,7 @@ from tests.engine import support
 from tetflora_addon.compiled.flora import compile_species
 from tetflora_addon.errors import SpeciesError
 from tetflora_addon.species.ages import with_habit
-from tetflora_addon.species.catalog import load_species
-from tetflora_addon.species.schema import ORDER_KEYS, species_from_dict
+from tetflora_addon.species.catalog import ORDER_KEYS, load_species, species_from_dict
 from tetflora_addon.species.species import Range
 
 

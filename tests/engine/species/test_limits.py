@@ -14,7 +14,7 @@ from tests.engine import support
 from tests.engine.species.test_species import refusal
 from tetflora_addon.errors import SpeciesError
 from tetflora_addon.leaves.models import MAX_FACE_CORNERS, leaf_model
-from tetflora_addon.species.schema import read_species
+from tetflora_addon.species.catalog import read_species
 
 
 def test_a_key_twice_among_very_many_is_found_at_once(tmp_path: Path) -> None:

@@ -17,10 +17,9 @@ from tetflora_addon.emission.plants import expanded_blocks
 from tetflora_addon.growth.growth import trunks
 from tetflora_addon.growth.seasons import Season
 from tetflora_addon.growth.seeds import Seeds
-from tetflora_addon.species.catalog import builtin_folder, load_species
+from tetflora_addon.species.catalog import builtin_folder, load_species, species_from_dict
 from tetflora_addon.species.litter import FALLEN, leaves_page, shed_share
 from tetflora_addon.species.members import expected_polygons
-from tetflora_addon.species.schema import species_from_dict
 
 TREES = ("beech", "oak", "birch", "spruce", "scots_pine", "willow")
 
@@ -49,7 +48,7 @@ def test_pages_are_sound_species_of_few_polygons(name, kind):
         species = species_from_dict(page, f"{name}_{kind}", "page")
         assert 20 < expected_polygons(species) < 3000
         assert len(json.dumps(page)) < 120_000
-        assert crown_of(species).seen > 0.0
+        assert name not in TREES or crown_of(species).seen > 0.0  # of what is sound all can be compiled
 
 
 @pytest.mark.parametrize("name", TREES)

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from tests.engine import support
 from tetflora_addon.errors import SpeciesError
-from tetflora_addon.species.schema import species_from_dict
+from tetflora_addon.species.catalog import species_from_dict
 from tetflora_addon.species.species import DAYS, LeafYear, Year
 
 LEAF: dict[str, Any] = {"appear": 115, "turn": 282, "fall": 296}

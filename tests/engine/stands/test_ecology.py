@@ -13,8 +13,7 @@ from tests.engine import support
 from tetflora_addon.compiled.flora import compile_species
 from tetflora_addon.errors import SpeciesError
 from tetflora_addon.species.ages import ages_of
-from tetflora_addon.species.catalog import load_species
-from tetflora_addon.species.schema import species_from_dict
+from tetflora_addon.species.catalog import load_species, species_from_dict
 from tetflora_addon.species.species import Ecology
 from tetflora_addon.stands.site import StandSpecies, StandTraits
 

@@ -11,7 +11,7 @@ import pytest
 from numpy.typing import NDArray
 
 from tetflora_addon.species.catalog import load_species
-from tetflora_addon.stands.change import Plants, SeedDispersal, planted
+from tetflora_addon.stands.grow import Plants, SeedDispersal, planted
 from tetflora_addon.stands.site import StandSite, StandSpecies, StandTraits
 
 SIDE = 600.0

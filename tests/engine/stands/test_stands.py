@@ -17,8 +17,7 @@ from tetflora_addon.errors import TetFloraError
 from tetflora_addon.jobs import run_to_end
 from tetflora_addon.species.catalog import load_species
 from tetflora_addon.species.species import Ecology
-from tetflora_addon.stands.change import LYING, Records, grown, planted
-from tetflora_addon.stands.grow import StandSettings, begun, grow
+from tetflora_addon.stands.grow import LYING, Records, StandSettings, begun, grow, grown, planted
 from tetflora_addon.stands.light import Crowns, LightGrid
 from tetflora_addon.stands.site import StandSite, StandSpecies, StandTraits
 

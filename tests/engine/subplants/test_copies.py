@@ -12,8 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tetflora_addon.growth.foliage import face_light
-from tetflora_addon.leaves.kites import leaf_kites
-from tetflora_addon.leaves.levels import leaf_levels
+from tetflora_addon.leaves.levels import leaf_kites, leaf_levels
 from tetflora_addon.leaves.models import LEAF_MODELS
 from tetflora_addon.subplants.leaf_meshes import KiteCopies, LeafCopies, LevelCopies
 
@@ -110,7 +109,7 @@ def test_no_copies_are_a_mesh_without_faces() -> None:
 @given(st.floats(0.01, 0.9), st.floats(0.05, 0.9))
 def test_solid_needles_send_on_as_much_light_as_sheets(color: float, transmission: float) -> None:
     """Light that enters a prism meets faces from within until it comes out."""
-    level = next(level for level in leaf_levels(LEAF_MODELS["needles"]) if level.solid)
+    level = next(level for level in leaf_levels(LEAF_MODELS["needles"], 4) if level.solid)
     plain = replace(level, again=np.zeros_like(level.again))
     copies = LevelCopies(plain, 1, transmission)
     copies.color[:], copies.done = color, 1

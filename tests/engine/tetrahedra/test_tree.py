@@ -104,7 +104,7 @@ def test_points_are_found_in_the_cell_that_holds_them(kind, window, seed, far):
 
 
 @CASES
-@settings(deadline=None, max_examples=30)
+@settings(deadline=None, max_examples=15)
 def test_ranks_rise_along_every_ray(kind, window, seed, far):
     camera, bounds, rng = view(kind, window, seed, far)
     tree = view_root(camera, bounds)
@@ -166,7 +166,7 @@ def test_any_division_fills_the_root_and_points_are_found(kind, window, seed, fa
 
 
 @CASES
-@settings(deadline=None, max_examples=15)
+@settings(deadline=None, max_examples=8)
 def test_both_orders_are_exact_after_any_division(kind, window, seed, far):
     camera, bounds, rng = view(kind, window, seed, far)
     tree = view_root(camera, bounds)

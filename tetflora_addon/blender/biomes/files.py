@@ -19,7 +19,7 @@ from ...errors import SceneError, SpeciesError, quoted
 from ...files import IDENTIFIER_RULE, is_identifier, parse_json, read_whole
 from ...formats import FORMATS, newest
 from ...planting.site import Limits
-from ...species.schema import species_from_dict
+from ...species.catalog import species_from_dict
 from ..file_library import MAX_FILE_BYTES, as_text
 from ..placing.population_data import (
     check_keys,

@@ -21,21 +21,19 @@ from ...assets.compiled import compile_steps
 from ...camera.camera import Camera
 from ...compiled.flora import Flora, compile_species
 from ...emission.asset_plan import AssetCosts, OriginalPolicy
-from ...emission.budget import BYTES_PER_TRIANGLE
-from ...emission.estimate import expanded_faces
-from ...emission.light import Sources
+from ...emission.budget import BYTES_PER_TRIANGLE, expanded_faces
 from ...errors import SceneError, TetFloraError
 from ...growth.growth import trunks
 from ...growth.seeds import Seeds
 from ...growth.wind import Wind
 from ...jobs import Job, Progress, mapped, run_to_end
+from ...light.illumination import Sources
 from ...processes import pool
 from ...refinement.lights import Light
-from ...refinement.loop import Outliers
+from ...refinement.loop import Outliers, Statistics
 from ...refinement.polygons import Polygons
 from ...refinement.settings import RefinementSettings
 from ...refinement.shared_parts import PlacedAssets
-from ...refinement.statistics import Statistics
 from ...species.catalog import list_species, load_species
 from ...species.kinds import Kind
 from ...species.species import Species

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from ... import memory
 from ...arrays import Floats, Integers
 from ...compiled.recorded_sizes import ages_of_heights
-from ...emission.estimate import Estimate, Stand, estimate
+from ...emission.budget import Estimate, Stand, estimate
 from ...errors import SpeciesError, TetFloraError
 from ...growth.seasons import PRESENT, expected_of
 from ...processes import pool

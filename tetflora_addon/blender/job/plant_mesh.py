@@ -12,7 +12,7 @@ from mathutils import Matrix
 from ...arrays import Floats
 from ...buffers import MeshBuffers, concatenate_buffers
 from ...compiled.flora import Flora
-from ...emission.estimate import coarse_faces
+from ...emission.budget import coarse_faces
 from ...emission.plants import expanded_blocks
 from ...errors import SceneError
 from ...growth.seeds import Seeds

@@ -35,9 +35,8 @@ from ...proxies.facet_weights import facet_weights, measuring, unmeasured
 from ...refinement import loop
 from ...refinement.decisions import Decision
 from ...refinement.lights import sun_of
-from ...refinement.loop import Refinement, step_of
+from ...refinement.loop import Refinement, Statistics, Stopwatch, step_of
 from ...refinement.settings import FIRST_LOOK, RefinementSettings
-from ...refinement.statistics import Statistics, Stopwatch
 from ...species.kinds import Kind
 from ..assets.places import Places, Target
 from ..compat import drawn_disc

@@ -9,7 +9,7 @@ from typing import Any
 
 import bpy
 
-from ...emission.light import BACK, FRONT
+from ...light.illumination import BACK, FRONT
 from ...optics import GLOSS, HAIRY
 from ..compat import disable_bump_correction
 from .bark import bark_group, bark_version
@@ -159,7 +159,7 @@ def baked_material() -> bpy.types.Material:
     """Material "TetFlora baked": `FRONT` and `BACK` to the camera, the material of proxies to all other rays.
 
     Both are FLOAT_VECTOR attributes on FACE or on POINT, of meshes or point clouds: linear radiance as a pixel shows
-    it. What has no front and back has the same in both, see `emission.light.baked_attributes`. Other rays see the
+    it. What has no front and back has the same in both, see `light.illumination.baked_attributes`. Other rays see the
     proxies' material so that ground and meshes get the usual light and shadows of plants.
 
     Notes

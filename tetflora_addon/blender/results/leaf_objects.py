@@ -12,10 +12,9 @@ from numpy.typing import NDArray
 
 from ...arrays import connected
 from ...errors import SpeciesError
-from ...leaves.blades import Compound
 from ...leaves.models import LeafModel, leaf_model
 from ...leaves.outlines import Blade
-from ...leaves.surfaces import Needles
+from ...leaves.surfaces import Compound, Needles
 from ...species.kinds import species_of
 from ...species.species import LEAF_KINDS, Species
 from ..attributes import mesh_of

@@ -12,9 +12,9 @@ from ...arrays import Floats32, Integers32
 from ...buffers import MeshBuffers, PointBuffers
 from ...emission.asset_plan import ASSETS
 from ...emission.emitters import Buffers, EmissionInput
-from ...emission.light import BATCH, BakedLight, SheetList, Sources, at_vertices, baked_attributes, baked_light
 from ...jobs import Job, Progress
-from ...refinement.statistics import Statistics
+from ...light.illumination import BATCH, BakedLight, SheetList, Sources, at_vertices, baked_attributes, baked_light
+from ...refinement.loop import Statistics
 from ..attributes import face_offsets, read, write
 from ..materials.nodes import find_socket, is_ours
 from ..worker import calling, in_thread, written

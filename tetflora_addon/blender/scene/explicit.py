@@ -14,7 +14,7 @@ import bpy
 import numpy as np
 
 from ...arrays import Floats, Floats32, Integers32
-from ...assets.mesh_features import mesh_features
+from ...assets.patches import mesh_features
 from ...errors import SceneError
 from ...refinement.polygons import Meshes, Surface
 from ..attributes import face_offsets, members, mesh_of, read, values_of, world_matrix

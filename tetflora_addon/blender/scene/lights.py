@@ -12,8 +12,8 @@ import bpy
 import numpy as np
 
 from ...arrays import Floats
-from ...emission.light import Sources
 from ...files import beside
+from ...light.illumination import Sources
 from ...light.sources import World
 from ...refinement.lights import Light
 from ..attributes import image_pixels, linear_rgb, world_matrix

@@ -16,8 +16,7 @@ import numpy as np
 
 from ...errors import NAME, SpeciesError, readable
 from ...files import write_whole
-from ...species.catalog import SpeciesInfo, builtin_folder, checked_identifier
-from ...species.schema import species_file, species_from_json
+from ...species.catalog import SpeciesInfo, builtin_folder, checked_identifier, species_file, species_from_json
 from ..declare import once, string
 from ..file_library import OwnFiles, Pictures, as_text, file_of
 from ..preferences import own_species_folder, species_folders

@@ -16,7 +16,7 @@ from bpy.props import EnumProperty, FloatProperty, FloatVectorProperty, IntPrope
 from ...errors import SpeciesError, readable
 from ...leaves.models import LEAF_MODELS
 from ...parameters import Key
-from ...species.schema import LENGTH_HIGH, ORDER_KEYS
+from ...species.catalog import LENGTH_HIGH, ORDER_KEYS
 from ...species.skeletons import MAX_ORDERS
 from ...species.species import BARKS, QUALITY_LIMITS
 from ..declare import FIXED, HIDDEN, boolean, integer, once

@@ -34,8 +34,9 @@ from ...species.catalog import (
     list_species,
     load_species,
     odd_files,
+    species_file,
+    species_from_json,
 )
-from ...species.schema import species_file, species_from_json
 from ...species.species import Species
 from ..declare import string
 from ..preferences import species_folders

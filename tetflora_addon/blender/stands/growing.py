@@ -19,8 +19,7 @@ from ...planting.plane import Terrain, inside_any
 from ...planting.site import lines_of_paths
 from ...planting.wetness import HeightGrid, cell_for, height_grid, wet_ground
 from ...species.species import Species
-from ...stands.change import Records
-from ...stands.grow import StandSettings, grow
+from ...stands.grow import Records, StandSettings, grow
 from ...stands.site import StandSite, StandSpecies
 from ..attributes import write
 from ..placing.plant_objects import link_field

@@ -18,7 +18,7 @@ import bpy
 
 from ...errors import TetFloraError
 from ...jobs import Job, Pace
-from ...refinement.statistics import Statistics
+from ...refinement.loop import Statistics
 from ..job import refine
 from ..job.frame_cache import choices, scene_digest
 from ..main_thread import in_main_thread
