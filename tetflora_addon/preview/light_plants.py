@@ -39,6 +39,8 @@ _BARE = 0.45
 _SUN, _SHADE = np.array([-0.45, -0.35, 0.82]), 0.45
 #: Radius of a trunk over its length, at least; plants of a species that its looks are taken from.
 _THIN, _SOME = 0.012, 64
+#: From so far out of the upright on, what a plant is does not stand but lies, as fallen branches do; radians.
+_LYING = 0.25 * np.pi
 _known: WeakKeyDictionary[Flora, Floats] = WeakKeyDictionary()
 _ANGLE = np.arange(SIDES) * 2.0 * np.pi / SIDES
 _AROUND = np.stack([np.cos(_ANGLE), np.sin(_ANGLE), 0 * _ANGLE], axis=1)
@@ -161,7 +163,8 @@ def _crowns(
 
 def crowns_of(flora: Flora, seeds: Seeds) -> Shapes:
     """All plants as points, as `light_plants` makes many."""
-    origin, rows = origin_near(seeds.position), flora.rows
+    # Some tell where most are, as well as all.
+    origin, rows = origin_near(seeds.position[:: max(len(seeds) // MOST_FACES, 1)]), flora.rows
     if seeds.crown is None:
         row, _, length = trunk_lengths(rows, seeds)
         forms = _profiles(flora).astype(np.float32)[rows["species"][row]] * length.astype(np.float32)[:, None]
@@ -170,9 +173,14 @@ def crowns_of(flora: Flora, seeds: Seeds) -> Shapes:
         low, high, *radii = _profiles(flora)[rows["species"][trunk.row]].T
         length, low, wider, _ = outlines(flora, trunk, low, high)
         forms = np.column_stack([low, high, *(wider * radius for radius in radii)]) * length[:, None]
+    axes = seeds.frame[:, :, 2].astype(np.float32)
+    lies = rows["angle"][flora.first_row, 0] > _LYING
+    if lies.any():
+        lying = np.flatnonzero(lies[seeds.species])
+        axes[lying] = trunks(rows, seeds.take(lying)).frame[:, :, 2]
     crowns = CrownPoints(
         (seeds.position - origin).astype(np.float32),
-        seeds.frame[:, :, 2].astype(np.float32),
+        axes,
         forms.astype(np.float32, copy=False),
         seeds.species,
         _looks_of_kinds(flora, _some_of_each(seeds)),
@@ -321,12 +329,6 @@ def _repeated(indices: Integers, corners: int, times: int) -> Integers32:
     return every.reshape(-1, indices.shape[1]).astype(np.int32)
 
 
-_SIDES = 6
-_WIDEST = 0.4  # fraction of the crown's height at which it is widest
-_SHADES = 0.5, 1.0  # of the lowest and the highest corner, by height
-_TRUNK = 0.03  # radius of the trunk over that of the crown
-
-
 def simple_crowns(
     matrices: Floats, size: tuple[float, float, float], color: Sequence[float], boxes: bool = False
 ) -> Shapes:
@@ -343,20 +345,21 @@ def simple_crowns(
     boxes : bool
         Edges of boxes instead of faces.
     """
-    corners, indices = _box(*size) if boxes else _crown(*size)
     of, origin = len(matrices), origin_near(matrices[:, :3, 3])
     shown = matrices[:: max(-(-of // MOST_PLANTS), 1)]
-    positions = corners @ shown[:, :3, :3].transpose(0, 2, 1) + (shown[:, None, :3, 3] - origin)
-    shade = np.interp(corners[:, 2], [0.0, size[2]], _SHADES)
-    colors = as_shown(np.clip(np.asarray(color) * shade[:, None], 0.0, 1.0))
-    return Shapes(
-        positions.reshape(-1, 3).astype(np.float32),
-        np.tile(colors, (len(shown), 1)).astype(np.float32),
-        _repeated(indices, len(corners), len(shown)),
-        len(shown),
-        of,
-        origin,
-    )
+    feet, frame, leaves = shown[:, :3, 3] - origin, shown[:, :3, :3], np.tile(color, (len(shown), 1))
+    if boxes:
+        corners, indices = _box(*size)
+        positions = (corners @ frame.transpose(0, 2, 1) + feet[:, None]).reshape(-1, 3).astype(np.float32)
+        colors = np.repeat(as_shown(leaves), len(corners), axis=0)
+    else:
+        radius, base, top = np.full((3, len(shown)), np.array(size)[:, None])
+        heights, widths = np.column_stack([base, top]), np.column_stack([radius, radius])
+        # What bears the crown is not known; it is in its shade.
+        positions, colors = _crowns(feet, frame, heights, widths, _THIN * top, leaves, _SHADE * leaves)
+        indices = _faces()
+    indices = _repeated(indices, len(positions) // max(len(shown), 1), len(shown))
+    return Shapes(positions, colors, indices, len(shown), of, origin)
 
 
 def joined(parts: Sequence[Shapes]) -> Shapes:
@@ -383,21 +386,6 @@ def joined(parts: Sequence[Shapes]) -> Shapes:
         origin,
         crowns,
     )
-
-
-def _crown(radius: float, base: float, top: float) -> tuple[Floats, Integers]:
-    """Corners (v, 3) and triangles (t, 3): a crown from its lowest corner over a ring to its highest, and a trunk."""
-    angle = np.arange(_SIDES) * 2.0 * np.pi / _SIDES
-    ring = np.stack([radius * np.cos(angle), radius * np.sin(angle), 0 * angle + base + _WIDEST * (top - base)], axis=1)
-    foot = np.array([[-1.0, -0.6, 0.0], [1.0, -0.6, 0.0], [0.0, 1.0, 0.0]]) * _TRUNK * radius
-    corners = np.concatenate([[[0.0, 0.0, base], [0.0, 0.0, top]], ring, foot])
-    i = np.arange(_SIDES)
-    j = (i + 1) % _SIDES
-    middle, trunk = 1, 2 + _SIDES
-    lower = np.stack([0 * i, 2 + j, 2 + i], axis=1)
-    upper = np.stack([2 + i, 2 + j, 0 * i + 1], axis=1)
-    stem = np.array([(trunk, trunk + 1, middle), (trunk + 1, trunk + 2, middle), (trunk + 2, trunk, middle)])
-    return corners, np.concatenate([lower, upper, stem])
 
 
 def _box(radius: float, base: float, top: float) -> tuple[Floats, Integers]:

@@ -132,7 +132,9 @@ def _standing(crowns: CrownPoints) -> gpu.types.GPUVertBuf:
     layout.attr_add(id="form", comp_type='F32', len=4, fetch_mode='FLOAT')
     buffer = gpu.types.GPUVertBuf(layout, len(crowns.kinds))
     buffer.attr_fill("pos", np.ascontiguousarray(crowns.positions))
-    buffer.attr_fill("form", np.ascontiguousarray(crowns.forms))
+    forms = crowns.forms.copy()
+    forms[:, :2] *= np.abs(crowns.axes[:, 2:])  # what lies is not high
+    buffer.attr_fill("form", forms)
     return buffer
 
 
