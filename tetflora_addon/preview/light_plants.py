@@ -278,19 +278,30 @@ def _profiles(flora: Flora) -> Floats:
     """Of each species (s, 4): lowest and highest leaves, and radii of its crown's rings, for a trunk of length 1."""
     summer = flora.in_leaf
     if summer not in _known:
-        _known[summer] = np.stack([_profile(flora, int(row)) for row in flora.first_row])
+        found, number = np.stack([_profile(flora, int(row)) for row in flora.first_row]), len(flora.first_row)
+        alike = np.zeros(number, np.int64), np.zeros((number, 3)), np.tile(np.eye(3), (number, 1, 1)), np.ones(number)
+        plants = trunks(summer.rows, Seeds(("",) * number, np.arange(number, dtype=np.int32), *alike))
+        # Of what is turned all ways, a half of leaves and a π-th of the surface of wood shows.
+        area = 0.5 * summer.leaf_areas(plants) + summer.wood_areas(plants) / np.pi
+        # What is seen through covers as much as it does, and is narrower for that.
+        found[:, 2:] *= -np.expm1(-area / np.maximum(_from_the_side(found) * plants.length**2, 1e-9))[:, None]
+        _known[summer] = found
     return _known[summer]
+
+
+def _from_the_side(profiles: Floats) -> Floats:
+    """Areas (s,) of crowns of profiles (s, 4): a cone below the rings, one above, the mean of both between them."""
+    low, high, *radii = profiles.T
+    return (high - low) * sum(radii) * 0.5 * (1.0 + _RINGS[1] - _RINGS[0])
 
 
 def crown_areas(flora: Flora) -> Floats:
     """Areas (s,) of the crowns of species from the side, of mean length and on the flora's day, m²."""
-    low, high, *radii = _profiles(flora).T
-    length = flora.rows["length"][flora.first_row, 0]
-    if flora.day is not None:
-        left = [np.mean(flora.day.share_range(flora.rows, number)) for number in range(len(length))]
-        radii = (_BARE + (1.0 - _BARE) * np.minimum(left, 1.0)) * radii
-    # A cone below the rings and one above, and between them what is as wide as both on average.
-    return (high - low) * sum(radii) * 0.5 * (1.0 + _RINGS[1] - _RINGS[0]) * length**2
+    area = _from_the_side(_profiles(flora)) * flora.rows["length"][flora.first_row, 0] ** 2
+    if flora.day is None:
+        return area
+    left = [np.mean(flora.day.share_range(flora.rows, number)) for number in range(len(area))]
+    return (_BARE + (1.0 - _BARE) * np.minimum(left, 1.0)) * area
 
 
 def _profile(flora: Flora, row: int) -> Floats:

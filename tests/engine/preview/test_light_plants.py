@@ -58,6 +58,17 @@ def test_fallen_branches_lie_on_the_ground_among_very_many_plants() -> None:
     np.testing.assert_allclose(np.linalg.norm(top, axis=1), np.sort(length)[::-1], rtol=1e-3)
 
 
+def test_what_is_seen_through_is_narrower_and_covers_as_much_as_it_does() -> None:
+    flora = support.flora()
+    for name, least, most in (("birch", 0.9, 1.0), ("flower", 0.4, 0.6)):  # with leaves of 6 and of 1.3 times its side
+        number = support.SPECIES.index(name)
+        whole = light_plants._profile(flora, int(flora.first_row[number]))
+        shown = light_plants._profiles(flora)[number]
+        assert np.array_equal(shown[:2], whole[:2])
+        assert (least < shown[2:] / whole[2:]).all()
+        assert (shown[2:] / whole[2:] < most).all()
+
+
 def test_points_of_two_kinds_are_joined_with_their_looks() -> None:
     flora, places = support.flora(), np.random.default_rng(6).uniform(-9.0, 9.0, (30, 3))
     seeds = [support.plants(np.arange(30), support.SPECIES.index(name), places + x, 1.0) for name, x in KINDS]
