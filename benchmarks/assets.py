@@ -41,7 +41,7 @@ from tetflora_addon import parallel, storage
 from tetflora_addon.assets import asset_cache
 from tetflora_addon.assets.compiled import compile_steps
 from tetflora_addon.blender import compat
-from tetflora_addon.blender.assets.parts import Target, digest_of, read_source_steps
+from tetflora_addon.blender.assets.places import Target, digest_of, read_source_steps
 from tetflora_addon.blender.job import refine
 from tetflora_addon.jobs import run_to_end
 from tetflora_addon.processes import pool

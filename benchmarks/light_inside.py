@@ -32,8 +32,7 @@ from tetflora_addon.blender.attributes import write
 from tetflora_addon.blender.job import refine
 from tetflora_addon.blender.placing.first_forest import sky
 from tetflora_addon.blender.results.output import result_collections
-from tetflora_addon.blender.scene.field_sizes import OFFSET, SIZE_ATTRIBUTES
-from tetflora_addon.blender.scene.fields import write_field
+from tetflora_addon.blender.scene.fields import OFFSET, SIZE_ATTRIBUTES, write_field
 from tetflora_addon.species.catalog import load_species
 from tetflora_addon.stands.change import Records
 from tetflora_addon.stands.grow import StandSettings, begun

@@ -26,7 +26,7 @@ from numpy.typing import NDArray
 from tetflora_addon.blender.attributes import write
 from tetflora_addon.blender.compat import shader_tree
 from tetflora_addon.blender.job import refine
-from tetflora_addon.blender.placing import cover, plant_objects, terrain
+from tetflora_addon.blender.placing import cover, plant_objects, populations, terrain
 from tetflora_addon.blender.worker import run_to_end
 from tetflora_addon.planting import places, rules
 
@@ -52,6 +52,8 @@ _LEAST = 12
 _AZIMUTH, _AWAY, _UP, _VIEW = np.radians(-112.0), 140.0, 5.0, np.radians(56.0)
 #: The summit is free of trees around a place so many meters ahead, within a radius, meters.
 _AHEAD, _CLEAR = 52.0, 86.0
+#: Side of the meadow that is densest, around that place, meters; all of it is twice as wide.
+_MEADOW = 104.0
 #: Fraction of the land that is not above the lake, and height of its shore, meters.
 _LAKE, _SHORE = 0.16, 3.0
 _LOOK = Look(
@@ -112,13 +114,15 @@ def _open_summit(scene: bpy.types.Scene, land: Terrain, eye: NDArray[np.float64]
         stage.plant(scene, species, seed, place(ahead, beside), 2.4 * seed, scale)
     add_figure(scene, place(*_FIGURE)).rotation_euler.z = np.pi - _AZIMUTH
     middle = eye + _AHEAD * forward
-    mesh, _, _ = grid("Summit", 2.4 * _CLEAR, 2.0, 0.0, lambda x, y: land.height(x + middle[0], y + middle[1]) + _LIFT)
-    top = bpy.data.objects.new("Summit", mesh)
-    top.location = *middle, 0.0
-    scene.collection.objects.link(top)
-    bpy.context.view_layer.update()
-    steps = cover.cover_steps(scene, bpy.context.evaluated_depsgraph_get(), scene.tetflora.populate, grounds=[top])
-    run_to_end(steps)
+    for name, side, hole in (("Near", _MEADOW, 0.0), ("Summit", 2.0 * _MEADOW, _MEADOW)):
+        mesh, _, _ = grid(name, side, 2.0, hole, lambda x, y: land.height(x + middle[0], y + middle[1]) + _LIFT)
+        top = bpy.data.objects.new(name, mesh)
+        top.location = *middle, 0.0
+        scene.collection.objects.link(top)
+        bpy.context.view_layer.update()
+        depsgraph = bpy.context.evaluated_depsgraph_get()
+        some = populations.add_population(scene, [top], name=name)
+        run_to_end(cover.cover_steps(scene, depsgraph, some, grounds=[top]))
 
 
 def _forbid(surface: bpy.types.Object, middle: NDArray[np.float64], level: float) -> None:

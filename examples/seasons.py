@@ -89,7 +89,8 @@ LOOKS = {
 }  # fmt: skip
 #: Sides of the land, meters, and of its part around the eye, of which every blade is planted.
 _LAND, _NEAR = 640.0, 130.0
-_EYE, _AHEAD, _LENS = (-9.0, -33.0, 2.0), (2.5, 12.0, 5.6), 31.0
+#: Where the eye is and what it looks at, above the land, meters, and its lens.
+EYE, AHEAD, LENS = (-9.0, -33.0, 2.0), (2.5, 12.0, 5.6), 31.0
 #: Trees of the hill and along its edge, with relative numbers; trees by themselves: species, seed, place, size, age.
 _HILL = {"beech": 0.30, "oak": 0.16, "birch": 0.16, "maple": 0.12, "larch": 0.10, "spruce": 0.16}
 _EDGE = {"hazel": 0.45, "rowan": 0.25, "birch": 0.15, "bush": 0.15}
@@ -131,15 +132,14 @@ def wooded(x: NDArray[np.float64], y: NDArray[np.float64]) -> NDArray[np.float64
 def build(scene: bpy.types.Scene) -> None:
     """Fill an empty scene with land, trees and what covers the ground; `dress` gives it a season."""
     _add_cherry(scene)
-    _add_log(scene)
     for species, seed, (x, y), scale, age in _LONE:
         stage.plant(scene, species, seed, (x, y, float(height(np.float64(x), np.float64(y)))), 2.4 * seed, scale, age)
     for name, side, step, hole in (("Near", _NEAR, 2.0, 0.0), ("Far", _LAND, 5.0, _NEAR)):
         ground = _ground(name, side, step, hole)
         scene.collection.objects.link(ground)
         _plant(scene, ground)
-    eye, ahead = (Vector((x, y, z + float(height(np.float64(x), np.float64(y))))) for x, y, z in (_EYE, _AHEAD))
-    stage.camera(scene, eye, ahead, lens=_LENS, near=0.05)
+    eye, ahead = (Vector((x, y, z + float(height(np.float64(x), np.float64(y))))) for x, y, z in (EYE, AHEAD))
+    stage.camera(scene, eye, ahead, lens=LENS, near=0.05)
     scene.tetflora.refine_at_render = False
 
 
@@ -162,15 +162,6 @@ def _add_cherry(scene: bpy.types.Scene) -> None:
     orders = [{**one, **_CHERRY_LEAVES} if one.get("leaves", [0])[0] > 0 else one for one in page["orders"]]
     year = {**page["year"], "leaf": {**page["year"]["leaf"], "fresh": [0.16, 0.15, 0.04]}}
     store_species(scene, "cherry", {**page, "name": "Cherry", "orders": orders, "year": year})
-
-
-def _add_log(scene: bpy.types.Scene) -> None:
-    """Let the logs of birches have lost their bark, which would draw all eyes from the middle of the meadow."""
-    from tetflora_addon.blender.placing.cover import fallen_from
-    from tetflora_addon.blender.species.edits import species_data, store_species
-
-    for birch in ("birch", among_others(scene, "birch", _HABIT)):
-        store_species(scene, f"{birch}_log", species_data(scene, fallen_from(scene, "oak", "log")))
 
 
 def _ground(name: str, side: float, step: float, hole: float) -> bpy.types.Object:

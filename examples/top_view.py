@@ -11,7 +11,7 @@ import numpy as np
 from mathutils import Matrix
 from numpy.typing import NDArray
 
-from tetflora_addon.blender.job import refine
+from devtools.partition import partition
 from tetflora_addon.blender.scene.plants import read_plants
 from tetflora_addon.refinement import decisions
 
@@ -38,7 +38,7 @@ def render_top_view(scene: bpy.types.Scene, path: Path, width: int = 1600, sampl
         Pixels; the height follows from the partition's shape.
     """
     depsgraph = bpy.context.evaluated_depsgraph_get()
-    camera, result = refine.partition(scene, depsgraph)
+    camera, result = partition(scene, depsgraph)
     decision = decisions.Decision
     drawing = bpy.data.scenes.new("Top view")
     try:

@@ -105,7 +105,7 @@ def grid(
     first = (np.arange(number - 1)[:, None] * number + np.arange(number - 1)).reshape(-1)
     faces = np.stack([first, first + 1, first + number + 1, first + number], axis=1)
     middle = np.maximum(np.abs(x[faces].mean(axis=1)), np.abs(y[faces].mean(axis=1)))
-    kept = faces[(middle > hole / 2) & (y[faces].mean(axis=1) > nearest)]
+    kept = faces[(middle >= hole / 2) & (y[faces].mean(axis=1) > nearest)]
     mesh = bpy.data.meshes.new(name)
     mesh.from_pydata(np.stack([x, y, height(x, y)], axis=1).tolist(), [], kept.tolist(), shade_flat=False)
     return mesh, x, y

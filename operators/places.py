@@ -12,11 +12,18 @@ from bpy_extras.io_utils import ImportHelper
 from ..tetflora_addon.blender.declare import once
 from ..tetflora_addon.blender.export.usd import ENDINGS as USD_ENDINGS
 from ..tetflora_addon.blender.export.usd import forest_steps
-from ..tetflora_addon.blender.geodata.columns import TetFloraInventoryColumn, chosen_columns, columns_in, show_columns
 from ..tetflora_addon.blender.geodata.origin import EXISTING, MIDDLE, WHOLE, Import, Imported, Steps
-from ..tetflora_addon.blender.geodata.outlines import outline_steps
-from ..tetflora_addon.blender.geodata.terrain import PATTERN, terrain_steps
-from ..tetflora_addon.blender.geodata.trees import GENERIC, LEFT_OUT, canopy_steps, inventory_steps
+from ..tetflora_addon.blender.geodata.terrain import PATTERN, outline_steps, terrain_steps
+from ..tetflora_addon.blender.geodata.trees import (
+    GENERIC,
+    LEFT_OUT,
+    TetFloraInventoryColumn,
+    canopy_steps,
+    chosen_columns,
+    columns_in,
+    inventory_steps,
+    show_columns,
+)
 from ..tetflora_addon.blender.species.catalog import NO_SPECIES, operator_items
 from ..tetflora_addon.errors import TetFloraError
 from ..tetflora_addon.geodata.inventories import IMPERIAL, METRIC

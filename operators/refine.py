@@ -6,7 +6,7 @@ import bpy
 
 from ..tetflora_addon.blender.declare import once
 from ..tetflora_addon.blender.job import refine
-from ..tetflora_addon.blender.job.assets import asset_warnings
+from ..tetflora_addon.blender.job.contents import asset_warnings
 from ..tetflora_addon.blender.job.forecast import forecast, learn
 from ..tetflora_addon.blender.job.plant_mesh import make_plant_mesh_steps
 from ..tetflora_addon.blender.placing.plant_objects import prepare_scene

@@ -8,7 +8,7 @@ from ..operators.layers import grounds_to_plant
 from ..tetflora_addon.blender.biomes.layers import GROUP, STAND, active_layer, is_due, is_gone, kind_of, plants_in
 from ..tetflora_addon.blender.biomes.library import FALLBACK_ICON, biomes, icon_of, items
 from ..tetflora_addon.blender.placing.distances import distance_to_draw, follows_species
-from ..tetflora_addon.blender.scene.field_sizes import has_history
+from ..tetflora_addon.blender.scene.fields import has_history
 from ..tetflora_addon.blender.settings import BIOME, FIELD, SCATTER, active_in
 from ..tetflora_addon.blender.viewport import points
 from .base import (

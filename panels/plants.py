@@ -7,8 +7,7 @@ import bpy
 from ..operators.marks import can_be_explicit, can_be_field
 from ..tetflora_addon.blender.assets.marks import is_species
 from ..tetflora_addon.blender.scene.ages import stage_text
-from ..tetflora_addon.blender.scene.field_points import has_ages
-from ..tetflora_addon.blender.scene.fields import stored_size
+from ..tetflora_addon.blender.scene.fields import has_ages, stored_size
 from ..tetflora_addon.blender.scene.objects import has_nodes, is_drop, is_scatter, may_scatter
 from ..tetflora_addon.blender.scene.skeletons import SKELETON_TYPES
 from ..tetflora_addon.blender.settings import active_in

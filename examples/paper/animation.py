@@ -18,7 +18,7 @@ import numpy as np
 
 from devtools import session
 from devtools.formats import set_format
-from tetflora_addon.blender.job import refine
+from devtools.partition import partition
 from tetflora_addon.blender.results.output import result_collections
 
 from .. import fly_through
@@ -123,7 +123,7 @@ def divided_anew(small: bool) -> tuple[list[int], int]:
 
 def _divided(scene: bpy.types.Scene) -> set[tuple[int, ...]]:
     """Tetrahedra that a frame divides, by center (tenths of a millimeter) and level."""
-    tree = refine.partition(scene, bpy.context.evaluated_depsgraph_get())[1].tree
+    tree = partition(scene, bpy.context.evaluated_depsgraph_get())[1].tree
     nodes = np.flatnonzero(tree.children[:, 0] >= 0)
     centers = tree.vertices(nodes).mean(axis=1)
     whole = np.isfinite(centers).all(axis=1)

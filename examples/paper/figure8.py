@@ -12,7 +12,7 @@ from pathlib import Path
 
 import bpy
 
-from tetflora_addon.blender.job import refine
+from devtools.partition import partition
 
 from .pictures import save_sheet
 from .scenes import refined, rendered, row
@@ -37,7 +37,7 @@ def make(out: Path, images: Path, small: bool) -> dict[str, float]:
         number = last or len(steps)
         picture = out / f"figure8-{number:02d}.png"
         rendered(scene, picture, 1 if small else 16)
-        draw_wires(picture, *refine.partition(scene, bpy.context.evaluated_depsgraph_get()))
+        draw_wires(picture, *partition(scene, bpy.context.evaluated_depsgraph_get()))
         # What waited for the next pass when this one was over; stopped here, it was drawn as it is.
         waiting = steps[number - 1].split
         made, meshed = statistics.tetrahedra_made, statistics.polygons_meshed

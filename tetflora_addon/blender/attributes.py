@@ -206,8 +206,12 @@ def face_offsets(mesh: bpy.types.Mesh) -> Integers32:
 
 @contextmanager
 def mesh_of(obj: bpy.types.Object) -> Iterator[bpy.types.Mesh | None]:
-    """The mesh of an object, evaluated or not, while the context lasts."""
+    """The mesh of an object, evaluated or not, while the context lasts; None for what cannot have any."""
     try:
-        yield obj.to_mesh()
+        mesh = obj.to_mesh()
+    except RuntimeError:  # hair, of which nodes may have made a mesh all the same
+        mesh = None
+    try:
+        yield mesh
     finally:
         obj.to_mesh_clear()

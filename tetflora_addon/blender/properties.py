@@ -10,14 +10,14 @@ from ..parameters import within
 from . import settings
 from .biomes import library
 from .declare import FIXED, HIDDEN, boolean, choice, integer, list_of, pointer_to, real, string
-from .geodata import columns
+from .geodata import trees
 from .placing import properties
 from .placing.plant_objects import show_age
 from .results import collection
 from .results.proxy_kinds import proxy_kind_property
 from .runtime import Listeners, classes_in
 from .scene import objects
-from .scene.field_sizes import stored_now
+from .scene.fields import stored_now
 from .scene.skeletons import SKELETON_TYPES
 from .settings import AnimationProperties, RefinementProperties
 from .species import asset_species, editor, edits
@@ -258,7 +258,7 @@ class TetFloraScene(RefinementProperties, AnimationProperties, library.BiomeChoi
 
 _MODULES = (
     *(properties, stand_properties, collection, state),
-    *(editor, edits, asset_species, objects, settings, columns),
+    *(editor, edits, asset_species, objects, settings, trees),
 )
 CLASSES = (
     *classes_in(_MODULES, bpy.types.PropertyGroup),

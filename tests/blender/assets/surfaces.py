@@ -8,7 +8,7 @@ import bpy
 import numpy as np
 
 from tetflora_addon.blender import compat
-from tetflora_addon.blender.assets.parts import Target, read_source_steps
+from tetflora_addon.blender.assets.places import Target, read_source_steps
 
 SQUARE = ((0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0))
 

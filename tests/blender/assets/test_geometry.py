@@ -12,7 +12,7 @@ from mathutils import Matrix
 from tests.blender.assets.surfaces import SQUARE, Paint, cards, image, read, target_of
 from tests.blender.scenes import add_mesh
 from tetflora_addon import errors
-from tetflora_addon.blender.assets.parts import Target, digest_of, read_source_steps
+from tetflora_addon.blender.assets.places import Target, digest_of, read_source_steps
 from tetflora_addon.blender.scene.objects import references_of
 from tetflora_addon.jobs import run_to_end
 

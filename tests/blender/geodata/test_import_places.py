@@ -20,7 +20,7 @@ from tests import places_inventories as inventories
 from tests.blender.digests import difference, everything
 from tests.blender.scenes import depsgraph, select
 from tetflora_addon.blender.attributes import read
-from tetflora_addon.blender.geodata import columns, outlines, trees
+from tetflora_addon.blender.geodata import terrain, trees
 from tetflora_addon.blender.geodata.origin import KEY, Import, importing, origin_of
 from tetflora_addon.blender.geodata.terrain import read_raster
 from tetflora_addon.blender.geodata.trees import curves_of
@@ -307,7 +307,7 @@ def test_the_dialog_shows_what_columns_were_taken_for(tmp_path):
             return self[-1]
 
     dialog = SimpleNamespace(table=Rows())
-    columns.show_columns(dialog.table, path)
+    trees.show_columns(dialog.table, path)
     assert [(row.name, row.field, row.values) for row in dialog.table] == [
         ("Art", 'NAME', "Tilia cordata, Acer rubrum"),
         ("top", 'NONE', "30, 40"),
@@ -315,7 +315,7 @@ def test_the_dialog_shows_what_columns_were_taken_for(tmp_path):
         ("y", 'Y', "0, 5"),
     ]
     dialog.table[1].field, dialog.table[1].unit = 'HEIGHT', 'ft'
-    assert json.loads(columns.chosen_columns(dialog.table)) == {"Art": "name", "top": "height ft", "x": "x", "y": "y"}
+    assert json.loads(trees.chosen_columns(dialog.table)) == {"Art": "name", "top": "height ft", "x": "x", "y": "y"}
 
 
 def test_canopy_heights_become_trees(tmp_path):
@@ -349,15 +349,13 @@ def test_broken_files_leave_everything_as_it_was(tmp_path, kind):
 
 @pytest.mark.parametrize("kind", ["grid", "csv", "outlines"])
 def test_closing_the_steps_leaves_everything_as_it_was(tmp_path, kind):
-    from tetflora_addon.blender.geodata import terrain
-
     scene, path = bpy.context.scene, files.write(tmp_path, kind)[1]
     before = everything()
     for number in (1, 2, 4, 6):
         steps = {
             "grid": lambda: terrain.terrain_steps(Import(scene, depsgraph(), path), 1000),
             "csv": lambda: trees.inventory_steps(Import(scene, depsgraph(), path), "GENERIC", "METRIC", False),
-            "outlines": lambda: outlines.outline_steps(Import(scene, depsgraph(), path)),
+            "outlines": lambda: terrain.outline_steps(Import(scene, depsgraph(), path)),
         }[kind]()
         for _ in range(number):
             if next(steps, None) is None:
@@ -376,7 +374,7 @@ def test_imports_stop_when_their_view_layer_goes(tmp_path, kind):
     steps = {
         "csv": lambda: trees.inventory_steps(Import(scene, graph, path), "GENERIC", "METRIC", False),
         "big_tiff": lambda: trees.canopy_steps(Import(scene, graph, path), {"beech": 1.0}, 3.0),
-        "outlines": lambda: outlines.outline_steps(Import(scene, graph, path)),
+        "outlines": lambda: terrain.outline_steps(Import(scene, graph, path)),
     }[kind]()
     next(steps)
     scene.view_layers.remove(scene.view_layers["ViewLayer"])

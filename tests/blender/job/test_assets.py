@@ -16,7 +16,7 @@ from tests.engine.assets import trees
 from tetflora_addon import storage
 from tetflora_addon.assets import asset_cache
 from tetflora_addon.blender.compat import eevee_engine
-from tetflora_addon.blender.job import assets, refine
+from tetflora_addon.blender.job import contents, refine
 from tetflora_addon.blender.results.collection import has_results
 from tetflora_addon.errors import TetFloraError
 
@@ -152,7 +152,7 @@ def test_refining_again_replaces_and_compiles_nothing(monkeypatch):
     scene, *_ = forest()
     first = run(scene)
     names = datablocks()
-    monkeypatch.setattr(assets, "compile_steps", lambda source: pytest.fail(f"compiled {source.name} again"))
+    monkeypatch.setattr(contents, "compile_steps", lambda source: pytest.fail(f"compiled {source.name} again"))
     second = run(scene)
     assert datablocks() == names
     one, other = first.as_dict(), second.as_dict()
@@ -168,7 +168,7 @@ def test_another_session_finds_what_was_compiled(monkeypatch, tmp_path):
         scene, *_ = forest()
         first = run(scene)
         asset_cache.forget()
-        monkeypatch.setattr(assets, "compile_steps", lambda source: pytest.fail(f"compiled {source.name} again"))
+        monkeypatch.setattr(contents, "compile_steps", lambda source: pytest.fail(f"compiled {source.name} again"))
         assert run(scene).polygons_proxy == first.polygons_proxy
     finally:
         storage.set_folder(folder)

@@ -331,17 +331,6 @@ def test_every_bark_that_species_may_name_is_there():
     assert bark.BARKS == species.BARKS
 
 
-@pytest.mark.parametrize(("steps", "groups"), [(1, 1), (2, 4)])
-def test_bark_that_is_stopped_while_it_is_made_leaves_nothing(steps, groups):
-    """Esc may come between its groups, of which one holds the others, and the material that uses them."""
-    work = materials.bark_steps("Oak", "smooth")
-    for _ in range(steps):
-        next(work)
-    assert len(bpy.data.node_groups) == groups
-    work.close()
-    assert not bpy.data.node_groups
-
-
 def test_patterns_are_built_of_small_trees():
     """Blender looks through all of a tree after each node and link: one of 120 nodes took as long as four of 60."""
     materials.bark_material("Oak", "smooth")

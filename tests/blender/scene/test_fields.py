@@ -18,7 +18,8 @@ from tests.blender.scenes import add_camera, add_mesh, add_plant, depsgraph, sel
 from tetflora_addon import errors
 from tetflora_addon.arrays import quaternions
 from tetflora_addon.blender.job import contents
-from tetflora_addon.blender.scene import field_points, objects
+from tetflora_addon.blender.scene import fields as scene_fields
+from tetflora_addon.blender.scene import objects
 from tetflora_addon.blender.scene.plants import NoPlantsError, read_plants
 
 pytestmark = pytest.mark.usefixtures("clean_file")
@@ -383,5 +384,5 @@ def test_rotations_to_quaternions_and_back():
     frames = np.linalg.qr(np.random.default_rng(3).normal(size=(200, 3, 3)))[0]
     frames *= np.sign(np.linalg.det(frames))[:, None, None]
     frames = np.concatenate([frames, [np.diag(d) for d in ((1, 1, 1), (1, -1, -1), (-1, 1, -1), (-1, -1, 1))]])
-    back = field_points._from_quaternions(np.ascontiguousarray(quaternions(frames).T))
+    back = scene_fields._from_quaternions(np.ascontiguousarray(quaternions(frames).T))
     assert np.allclose(back.transpose(2, 0, 1), frames, atol=1e-9)

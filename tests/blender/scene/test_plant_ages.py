@@ -20,7 +20,7 @@ from tetflora_addon import errors
 from tetflora_addon.blender.job import contents, forecast, frame_cache, plant_mesh, refine
 from tetflora_addon.blender.placing import canopy, distances, plant_objects, populations, rules
 from tetflora_addon.blender.results.output import result_collections
-from tetflora_addon.blender.scene import ages, field_points, fields, skeletons
+from tetflora_addon.blender.scene import ages, fields, skeletons
 from tetflora_addon.blender.scene.plants import read_plants
 from tetflora_addon.blender.viewport import levels
 from tetflora_addon.jobs import run_to_end
@@ -159,7 +159,7 @@ def test_a_field_is_the_plants_that_it_stands_for(scene):
     row_of_plants(np.linspace(2.0, 70.0, 25).tolist())
     before = by_plant(seeds(scene))
     field = plant_objects.field_from_plants(scene, depsgraph(), list(scene.objects)[1:])
-    assert field_points.has_ages(field)
+    assert fields.has_ages(field)
     assert by_plant(seeds(scene)) == before
     back = plant_objects.plants_from_field(scene, depsgraph(), field, 100)
     assert by_plant(seeds(scene)) == before
@@ -213,7 +213,7 @@ def test_a_population_has_the_ages_of_its_rule(scene, store):
         (field,) = made.objects
         found = fields.read_aged_field(field, depsgraph(), np.eye(4)[None])[1]
     else:
-        found = field_points.stored_ages(made.objects)
+        found = fields.stored_ages(made.objects)
     assert 30.0 < np.median(found) < 50.0
     assert len(np.unique(found)) == made.number
     assert 0.4 < ((found > 40.0 / 1.3) & (found < 40.0 * 1.3)).mean() < 0.9
@@ -226,7 +226,7 @@ def test_a_population_has_the_ages_of_its_rule(scene, store):
 
 def test_populations_without_ages_are_as_before(scene):
     population, made = populated(scene, as_field='FIELD')
-    assert not field_points.has_ages(made.objects[0])
+    assert not fields.has_ages(made.objects[0])
     assert made.objects[0].tetflora.age == 0.0
     before = rules.fingerprint(population)
     population.age_spread = 0.5

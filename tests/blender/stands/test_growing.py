@@ -14,8 +14,7 @@ from operators.layers import TETFLORA_OT_keep_year
 from tests.blender.scenes import add_mesh, depsgraph, select
 from tetflora_addon import errors
 from tetflora_addon.blender.placing.brush import Standing
-from tetflora_addon.blender.scene.field_sizes import has_history, stored_now, year_curves
-from tetflora_addon.blender.scene.fields import read_aged_field
+from tetflora_addon.blender.scene.fields import has_history, read_aged_field, stored_now, year_curves
 from tetflora_addon.blender.stands import growing
 
 pytestmark = pytest.mark.usefixtures("clean_file")

@@ -12,10 +12,10 @@ import numpy as np
 import pytest
 
 from devtools.layouts import Layout
+from devtools.partition import partition
 from panels.refine import TETFLORA_PT_refine
 from tests.blender.scenes import add_camera, add_plant, datablocks, depsgraph
 from tetflora_addon import errors
-from tetflora_addon.blender.job import refine
 from tetflora_addon.blender.scene.fields import write_field
 from tetflora_addon.blender.viewport import auto, levels, overlay, state
 from tetflora_addon.blender.viewport.levels import _on_timer, _on_update, level_steps, read_shapes
@@ -44,7 +44,7 @@ def test_levels_are_those_of_refinement_and_leave_no_trace():
     preview = compute()
     assert datablocks() == before
     assert scene.tetflora.statistics == statistics
-    _, refinement = refine.partition(scene, depsgraph())
+    _, refinement = partition(scene, depsgraph())
     levels = preview.levels
     assert len(levels) == refinement.passes > 1
     assert levels.levels[-1].nodes.tolist() == refinement.nodes.tolist()
@@ -57,7 +57,7 @@ def test_shells_are_refined_as_refine_does():
     coarse = len(compute().levels.levels[-1])
     scene.tetflora.proxy_kind = 'SHELLS'
     fine = compute().levels.levels[-1]
-    _, refinement = refine.partition(scene, depsgraph())
+    _, refinement = partition(scene, depsgraph())
     assert fine.nodes.tolist() == refinement.nodes.tolist()
     assert len(fine) > coarse
 

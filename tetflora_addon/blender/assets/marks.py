@@ -13,6 +13,7 @@ is compiled and no renderer is asked. Materials count by their mean color.
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from hashlib import blake2b
+from typing import Any
 
 import bpy
 import numpy as np
@@ -36,8 +37,7 @@ from ..species.asset_species import (
     stored_picture,
 )
 from ..species.edits import tell_listeners
-from .parts import Target
-from .places import Scatter, read_scatters, variants_of
+from .places import Scatter, Target, read_scatters, variants_of
 
 _POINTS = 60_000  # of a picture
 _TRIANGLES = 200_000  # of one mesh that are looked at
@@ -46,19 +46,6 @@ _FINER = 2  # pixels of the picture that is made for one that is kept
 _BASE = 0.1  # fraction of the area that lies below the crown's base
 _UP, _SIDE = np.array([0.0, -0.26, 0.966]), np.array([1.0, 0.0, 0.0])  # axes of the picture: a little from above
 _SUN = np.array([-0.45, -0.55, 0.7])
-
-
-@dataclass(frozen=True)
-class Measures:
-    """Of a plant of scale 1: meters, number of faces, m², linear RGB; and a picture, the lowest row first."""
-
-    radius: float
-    base: float
-    height: float
-    polygons: float
-    leaves: float
-    color: tuple[float, float, float]
-    picture: NDArray[np.uint8]
 
 
 @dataclass
@@ -114,8 +101,8 @@ def _read_one(mesh: bpy.types.Mesh, materials: list[bpy.types.Material | None], 
     )
 
 
-def measure(variants: Iterable[tuple[Target, Floats]], depsgraph: bpy.types.Depsgraph) -> Measures | None:
-    """Means over the variants of a species, and a picture of the first.
+def measure(variants: Iterable[tuple[Target, Floats]], depsgraph: bpy.types.Depsgraph) -> dict[str, Any]:
+    """Means over the variants of a species, by the properties of `TetFloraAssetSpecies`, and a picture of the first.
 
     Parameters
     ----------
@@ -124,8 +111,8 @@ def measure(variants: Iterable[tuple[Target, Floats]], depsgraph: bpy.types.Deps
 
     Returns
     -------
-    Measures or None
-        None where nothing has a face.
+    dict
+        Empty where nothing has a face.
 
     Raises
     ------
@@ -138,10 +125,9 @@ def measure(variants: Iterable[tuple[Target, Floats]], depsgraph: bpy.types.Deps
         if meshes:
             found.append(_measured(meshes, picture=not found))
     if not found:
-        return None
-    numbers = np.array([(m.radius, m.base, m.height, m.polygons, m.leaves) for m in found]).mean(axis=0).tolist()
-    color = tuple(np.mean([m.color for m in found], axis=0).tolist())
-    return Measures(*numbers, color, found[0].picture)
+        return {}
+    means = {name: np.mean([one[name] for one in found], axis=0).tolist() for name in found[0] if name != "picture"}
+    return means | {"picture": found[0]["picture"]}
 
 
 def size_of(variants: Iterable[tuple[Target, Floats]], depsgraph: bpy.types.Depsgraph) -> tuple[float, float]:
@@ -186,7 +172,8 @@ def _corners(low: NDArray, high: NDArray, places: Floats) -> Floats:
     return corner @ places[:, :3, :3].transpose(0, 2, 1) + places[:, None, :3, 3]
 
 
-def _measured(meshes: list[_Mesh], picture: bool) -> Measures:
+def _measured(meshes: list[_Mesh], picture: bool) -> dict[str, Any]:
+    """Of a plant of scale 1: meters, number of faces, m², linear RGB, and a stored picture."""
     low, high = np.full(3, np.inf), np.full(3, -np.inf)
     for mesh in meshes:
         box = _corners(mesh.low, mesh.high, mesh.places)
@@ -194,15 +181,15 @@ def _measured(meshes: list[_Mesh], picture: bool) -> Measures:
     points, normals, colors = _sampled(meshes)
     radius, height = _extent(low, high)
     base = float(np.clip(np.quantile(points[:, 2], _BASE), 0.0, height)) if len(points) else 0.0
-    return Measures(
-        radius=radius,
-        base=base,
-        height=height,
-        polygons=float(sum(len(mesh.places) * mesh.faces for mesh in meshes)),
-        leaves=sum(mesh.sizes * mesh.leaves for mesh in meshes),
-        color=tuple(colors.mean(axis=0).tolist()) if len(colors) else GRAY,
-        picture=_drawn(points, normals, colors, low, high) if picture else np.zeros((0, 0, 4), np.uint8),
-    )
+    return {
+        "radius": radius,
+        "base": base,
+        "height": height,
+        "polygons": float(sum(len(mesh.places) * mesh.faces for mesh in meshes)),
+        "leaves": sum(mesh.sizes * mesh.leaves for mesh in meshes),
+        "color": colors.mean(axis=0) if len(colors) else GRAY,
+        "picture": stored_picture(_drawn(points, normals, colors, low, high)) if picture else "",
+    }
 
 
 def _sampled(meshes: list[_Mesh]) -> tuple[Floats, Floats, Floats]:
@@ -274,20 +261,10 @@ def use_as_species(
 ) -> TetFloraAssetSpecies:
     """Make an object or a collection a species of this file; one that is a species already is measured anew.
 
-    Parameters
-    ----------
-    scene : bpy.types.Scene
-        Receives the entry.
-    datablock : bpy.types.Object or bpy.types.Collection
-        Original; may be linked from a library.
-    variants : bool
-        Each object of the collection, and each collection within it, is a plant of its own, and not all together one.
-        Where an empty is given that shows a collection, the collection is one plant, and so are all such empties.
-
-    Raises
-    ------
-    SceneError
-        Nothing of it has faces; the message names it.
+    ``scene`` receives the entry. ``datablock`` is original, and may be linked from a library. ``variants``: each object
+    of the collection, and each collection within it, is a plant of its own, and not all together one. Where an empty is
+    given that shows a collection, the collection is one plant, and so are all such empties. Raises `SceneError`:
+    nothing of it has faces; the message names it.
     """
     if isinstance(datablock, bpy.types.Object) and datablock.type == 'EMPTY' and datablock.instance_collection:
         datablock, variants = datablock.instance_collection, False  # it shows all of it
@@ -330,13 +307,9 @@ def _identifier(datablock: Datablock) -> str:
 def measure_again(depsgraph: bpy.types.Depsgraph, entry: TetFloraAssetSpecies) -> bool:
     """Measure an asset and draw its picture; false where it has no faces."""
     found = measure(variants_of(entry, depsgraph), depsgraph)
-    if found is None:
-        return False
-    entry.name = (entry.object or entry.collection).name
-    for name in ("radius", "base", "height", "polygons", "leaves", "color"):
-        setattr(entry, name, getattr(found, name))
-    entry.picture = stored_picture(found.picture)
-    return True
+    for name, value in ({"name": (entry.object or entry.collection).name} | found if found else {}).items():
+        setattr(entry, name, value)
+    return bool(found)
 
 
 def measure_all(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, identifiers: Iterable[str]) -> None:

@@ -1,39 +1,416 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Where assets stand: what marked objects scatter, and plants whose species is an asset.
+"""Assets: what each consists of, and where it stands.
 
-An object's nodes, particles or collection are followed to the first level of what they instance: that are the assets.
-A group of instances without anything of its own is opened, so that what is a tree counts as the asset; one of very
-many parts is taken for a tree itself. All places of an asset are computed at once, as arrays.
+An asset is an object, a collection, or geometry that nodes instance without an object of its own. What it instances by
+collections, nodes and particles is followed down to meshes, each with all of its places in the asset. Its digest, of
+meshes, materials and images, tells whether what it shows has changed since it was compiled.
+
+Assets stand where marked objects scatter them, and where plants do whose species is an asset. An object's nodes,
+particles or collection are followed to the first level of what they instance: that are the assets. A group of instances
+without anything of its own is opened, so that what is a tree counts as the asset; one of very many parts is taken for a
+tree itself. All places of an asset are computed at once, as arrays.
 """
 
-from dataclasses import dataclass, replace
-from typing import Self
+import hashlib
+from collections.abc import Generator, Iterator
+from contextlib import contextmanager, nullcontext
+from dataclasses import dataclass, field, replace
+from functools import cache
+from pathlib import Path
+from typing import Any, Self
 
 import bpy
 import numpy as np
 from numpy.typing import NDArray
 
 from ...arrays import Floats, Keys, Mask
+from ...assets.asset import AssetSource, AssetSurface
 from ...errors import SceneError
 from ...growth.hashing import child_key, key_of_seed, uniform
-from ..attributes import world_matrix
+from ...jobs import mapped
+from ..attributes import image_pixels, members, mesh_of, read, values_of, world_matrix
+from ..compat import tree_in_use
+from ..materials.face_looks import FaceReader
+from ..materials.node_values import settings_of
+from ..materials.nodes import is_ours
 from ..scene.objects import (
     DEEPEST,
     SURFACE_TYPES,
     Reference,
     geometry_of,
     has_nodes,
-    instanced,
+    instanced_by,
     is_listed,
     is_scatter,
     listed_instances,
+    materials_of,
     name_keys,
     renderable_objects,
 )
 from ..scene.plants import AssetPlants, read_asset_plants
 from ..species.asset_species import TetFloraAssetSpecies, asset_species
-from .parts import Target
+
+#: What all nodes have: where they stand in the editor and how they look there; and what only refers to others.
+_IDLE = {one.identifier for one in bpy.types.Node.bl_rna.properties} - {"type", "mute"}
+_IDLE |= {"image_user", "texture_mapping", "color_mapping"}
+# Content of packed images by identity and length: they are read once.
+_packed: dict[tuple[int, int], str] = {}
+
+
+def attributes_of(material: bpy.types.Material | None) -> Iterator[str]:
+    """Names of attributes that a material asks for, groups included."""
+    waiting = [] if material is None or (tree := tree_in_use(material)) is None else [tree]
+    while waiting:
+        for node in waiting.pop().nodes:
+            if node.type == 'ATTRIBUTE':
+                yield node.attribute_name
+            elif node.type == 'VERTEX_COLOR':
+                yield node.layer_name
+            elif node.type == 'GROUP' and node.node_tree is not None:
+                waiting.append(node.node_tree)
+
+
+def _material(material: bpy.types.Material | None) -> object:
+    """What a material looks like, as numbers, texts and sequences of these."""
+    return material and (tuple(material.diffuse_color), (tree := tree_in_use(material)) and _tree(tree))
+
+
+def _tree(tree: bpy.types.NodeTree) -> object:
+    number = {node.as_pointer(): i for i, node in enumerate(tree.nodes)}
+    nodes = [
+        (
+            node.bl_idname,
+            [(name, _plain(getattr(node, name))) for name in _settings(type(node))],
+            [_value(s) for s in node.inputs if not s.is_linked and hasattr(s, "default_value")],
+            [_value(s) for s in node.outputs if node.type in {'RGB', 'VALUE'}],
+        )
+        for node in tree.nodes
+        if node.type not in {'FRAME', 'REROUTE'}
+    ]
+    links = [
+        [(number[n.as_pointer()], s.identifier) for n, s in ((k.from_node, k.from_socket), (k.to_node, k.to_socket))]
+        for k in tree.links
+    ]
+    return nodes, links, [link.is_muted for link in tree.links]
+
+
+def _value(socket: bpy.types.NodeSocket) -> tuple[str, object]:
+    return socket.identifier, _plain(socket.default_value)
+
+
+@cache
+def _settings(kind: type[bpy.types.Node]) -> list[str]:
+    """Properties of a kind of nodes that count."""
+    return [p.identifier for p in kind.bl_rna.properties if p.identifier not in _IDLE and p.type != 'COLLECTION']
+
+
+def _plain(value: Any) -> object:
+    if isinstance(value, bpy.types.Image):
+        return image_digest(value)
+    if isinstance(value, bpy.types.NodeTree):
+        return _tree(value)
+    if isinstance(value, bpy.types.ColorRamp | bpy.types.CurveMapping):
+        return settings_of(value)
+    if isinstance(value, bpy.types.ID):
+        return value.name_full
+    if isinstance(value, bpy.types.bpy_struct):
+        return None
+    return tuple(value) if hasattr(value, "__len__") and not isinstance(value, str) else value
+
+
+def image_digest(image: bpy.types.Image) -> str:
+    """Digest of an image: of its pixels if only this file has them, else of the file that it is in."""
+    how = f"{tuple(image.size)} {image.source} {image.alpha_mode} {image.colorspace_settings.name} "
+    if image.is_dirty and image.size[0]:
+        return how + hashlib.sha256(np.ascontiguousarray(image_pixels(image))).hexdigest()
+    packed = image.packed_file
+    if packed is not None:
+        key = image.session_uid, packed.size
+        if key not in _packed:
+            _packed[key] = hashlib.sha256(packed.data).hexdigest()
+        return how + _packed[key]
+    if image.source == 'GENERATED':
+        return how + f"{image.generated_type} {tuple(image.generated_color)}"
+    path = Path(bpy.path.abspath(image.filepath, library=image.library))
+    try:
+        stat = path.stat()
+    except OSError:
+        return how + f"{path}"
+    return how + f"{path} {stat.st_size} {stat.st_mtime_ns}"
+
+
+Slots = list[bpy.types.Material | None]
+
+
+@dataclass
+class AssetPart:
+    """A mesh of an asset."""
+
+    name: str  # of the object, for messages
+    shown: bpy.types.Object | bpy.types.GeometrySet  # the original object whose mesh it is, or the geometry
+    places: list[Floats] = field(default_factory=list)  # from its space to that of the asset
+
+    @property
+    def matrices(self) -> Floats:
+        """All places (n, 4, 4)."""
+        return np.concatenate(self.places)
+
+    @contextmanager
+    def opened(self, depsgraph: bpy.types.Depsgraph) -> Iterator[tuple[bpy.types.Mesh, Slots] | None]:
+        """The mesh as it is evaluated, and its materials, while the context lasts; None if it has no faces."""
+        bare = isinstance(self.shown, bpy.types.GeometrySet)
+        obj = None if bare else _evaluated(self.shown, depsgraph)
+        with nullcontext(self.shown.mesh) if bare else mesh_of(obj) as mesh:
+            yield (mesh, materials_of(obj, mesh)) if mesh is not None and len(mesh.polygons) else None
+
+
+def _evaluated(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> bpy.types.Object:
+    """The evaluated object; the original where it is not evaluated, which has no modifiers then."""
+    evaluated = obj.evaluated_get(depsgraph)
+    return evaluated if evaluated.is_evaluated else obj
+
+
+Trail = tuple[bpy.types.ID, ...]
+
+
+class _Parts:
+    """Follows references down to meshes, with all places at once; a path are the datablocks that it is in."""
+
+    def __init__(self, name: str, depsgraph: bpy.types.Depsgraph) -> None:
+        self._name, self._depsgraph = name, depsgraph
+        self.parts: dict[object, AssetPart] = {}
+        self.warnings: list[str] = []
+
+    def take(self, shown: Reference, matrices: Floats, path: Trail = ()) -> None:
+        """Take something with what it instances."""
+        geometry = None
+        if isinstance(shown, bpy.types.GeometrySet):
+            if shown.mesh is not None:
+                name = shown.name or (path[-1].name if path else self._name)
+                self._add(shown, AssetPart(name, shown), matrices)
+        else:
+            self._refuse_cycle(shown, path)
+            path = (*path, shown)
+        if isinstance(shown, bpy.types.Object):
+            if not shown.is_instancer or shown.show_instancer_for_render or shown.instance_type == 'COLLECTION':
+                self._own(shown, matrices)
+            if is_listed(shown):
+                self._one_by_one(shown, matrices)
+                return
+            if shown.type == 'CURVES' and has_nodes(shown):
+                geometry = geometry_of(shown, self._depsgraph)
+        keys = np.zeros(len(matrices), np.uint64)
+        for target, places, _ in instanced_by(shown, matrices, keys, self._depsgraph):
+            self.take(target, places, path)
+        if geometry is not None and geometry.mesh is not None:
+            self._add(shown, AssetPart(shown.name, geometry), matrices)
+
+    @staticmethod
+    def _refuse_cycle(shown: bpy.types.Object | bpy.types.Collection, path: Trail) -> None:
+        if shown in path and isinstance(shown, bpy.types.Object):
+            raise SceneError(
+                f'"{shown.name}" instances itself, by way of "{path[-1].name}"; change what one of the two instances'
+            )
+        if shown in path:
+            raise SceneError(
+                f'The collection "{shown.name}" instances itself, by way of "{path[-1].name}"; take that object out of '
+                "the collection, or let it instance another one"
+            )
+
+    def _one_by_one(self, obj: bpy.types.Object, matrices: Floats) -> None:
+        """Instances on vertices and faces, and of particles, which only Blender's own list has."""
+        back = np.linalg.pinv(world_matrix(obj, self._depsgraph).astype(np.float64))
+        found: dict[bpy.types.Object, list[Floats]] = {}
+        for _, instance in listed_instances(self._depsgraph, (obj,)):
+            if instance.object.original != obj:
+                place = back @ np.array(instance.matrix_world, dtype=np.float64)
+                found.setdefault(instance.object.original, []).append(place)
+        if not found:
+            self.warnings.append(
+                f'What "{obj.name}" instances on vertices, faces or particles is left out of "{self._name}", because '
+                "it is not in the scene; link it to the scene, or make its instances real"
+            )
+        for shown, places in found.items():
+            self._own(shown, (matrices[:, None] @ np.array(places)).reshape(-1, 4, 4))
+
+    def _own(self, obj: bpy.types.Object, matrices: Floats) -> None:
+        """Take the surface of an object itself."""
+        if obj.type not in SURFACE_TYPES or is_ours(obj):
+            return
+        if obj.type == 'CURVES':
+            if not has_nodes(obj):
+                self.warnings.append(f'The hair of "{obj.name}" is left out of "{self._name}"; give it faces by nodes')
+            return
+        evaluated = _evaluated(obj, self._depsgraph)
+        if obj.type == 'MESH':
+            # Objects that share a mesh and its materials are one.
+            own = tuple(s.material for s in obj.material_slots if s.link == 'OBJECT')
+            self._add((evaluated.data.as_pointer(), own), AssetPart(obj.name, obj), matrices)
+        else:
+            self._add(obj, AssetPart(obj.name, obj), matrices)
+
+    def _add(self, key: object, part: AssetPart, matrices: Floats) -> None:
+        self.parts.setdefault(key, part).places.append(matrices)
+
+
+#: Changes what a digest is of; raise it when what is read of an asset changes.
+_VERSION = 3
+_COLORS = {'FLOAT_COLOR', 'BYTE_COLOR'}
+_TYPES = {'FLOAT', 'INT', 'BOOLEAN', 'FLOAT2', 'FLOAT_VECTOR', *_COLORS}
+
+
+@dataclass(frozen=True)
+class Target:
+    """What is instanced; equal where it is the same datablock, or the same geometry."""
+
+    #: An original. An object's space is its own, without its place in the scene; that of a collection is where
+    #: instances of it show it: its objects as they stand, from its offset.
+    datablock: bpy.types.Object | bpy.types.Collection | None
+    geometry: bpy.types.GeometrySet | None  # without a datablock: what nodes instance
+    owner: bpy.types.Object | None  # whose nodes
+    name: str  # for messages
+
+    @property
+    def shown(self) -> bpy.types.Object | bpy.types.Collection | bpy.types.GeometrySet:
+        """The datablock or the geometry."""
+        return self.geometry if self.datablock is None else self.datablock
+
+    def parts(self, depsgraph: bpy.types.Depsgraph) -> tuple[list[AssetPart], list[str]]:
+        """What it consists of, and warnings of what is left out.
+
+        Raises
+        ------
+        SceneError
+            Something instances itself; the message names it.
+        """
+        walk = _Parts(self.name, depsgraph)
+        walk.take(self.shown, np.eye(4)[None])
+        return list(walk.parts.values()), walk.warnings
+
+    def meshes(self, depsgraph: bpy.types.Depsgraph) -> Iterator[tuple[AssetPart, bpy.types.Mesh, Slots]]:
+        """Its parts with faces one after the other, each with its mesh and materials while it is looked at."""
+        for part in self.parts(depsgraph)[0]:
+            with part.opened(depsgraph) as opened:
+                if opened is not None:
+                    yield part, *opened
+
+
+def digest_of(target: Target, depsgraph: bpy.types.Depsgraph, parts: list[AssetPart] | None = None) -> str:
+    """Hexadecimal digest of all that a target shows: meshes, their attributes, materials and images, and places.
+
+    Names of objects do not count, and of images in files only which file it is, how long and how old.
+    Errors are those of `Target.parts`.
+    """
+    content = hashlib.sha256(str(_VERSION).encode())
+    for part in target.parts(depsgraph)[0] if parts is None else parts:
+        with part.opened(depsgraph) as opened:
+            if opened is not None:
+                content.update(np.ascontiguousarray(part.matrices))
+                _add_mesh(content, *opened)
+    return content.hexdigest()
+
+
+def _add_mesh(content: "hashlib._Hash", mesh: bpy.types.Mesh, slots: Slots) -> None:
+    content.update(repr([_material(material) for material in slots]).encode())
+    content.update(f"{len(mesh.vertices)} {len(mesh.polygons)} {len(mesh.loops)}".encode())
+    content.update(read(mesh, "position"))
+    content.update(read(mesh, ".corner_vert"))
+    if len(mesh.loops) != 3 * len(mesh.polygons):  # else all are triangles, one after the other
+        content.update(members(mesh.polygons, "loop_start", dtype=np.int32))
+    wanted = {"material_index", *(name for material in slots for name in attributes_of(material))}
+    for attribute in mesh.attributes:
+        kind = attribute.data_type
+        if kind in _TYPES and (attribute.name in wanted or kind == 'FLOAT2'):
+            content.update(f"{attribute.name} {attribute.domain} {kind}".encode())
+            content.update(values_of(attribute, "color" if kind in _COLORS else ""))
+    first = next((layer.name for layer in mesh.uv_layers if layer.active_render), "")
+    content.update(first.encode())
+
+
+#: Triangles whose corners become vertices at once.
+_TRIANGLES = 1 << 18
+
+
+def read_source_steps(
+    target: Target, depsgraph: bpy.types.Depsgraph
+) -> Generator[float, None, tuple[AssetSource, tuple[str, ...]]]:
+    """Read all surfaces of an asset; yields the fraction that is done.
+
+    Parameters
+    ----------
+    depsgraph : bpy.types.Depsgraph
+        Between two steps it may be evaluated again, but must be there.
+
+    Returns
+    -------
+    AssetSource
+    tuple of str
+        Warnings for the artist: images that are missing, materials without shaders, and what is left out.
+
+    Raises
+    ------
+    SceneError
+        The asset has no faces, has vertices that are not finite numbers, or instances itself; the message names it.
+    """
+    parts, left = target.parts(depsgraph)
+    reader = FaceReader()
+    reader.warn(left)
+    digest = digest_of(target, depsgraph, parts)
+    surfaces: list[AssetSurface] = []
+    shown: list[AssetPart] = []
+    for number, part in enumerate(parts):
+        steps = _surface_steps(part, depsgraph, reader)
+        surface = yield from mapped(steps, lambda done, before=number: (before + done) / len(parts))
+        if surface is not None:
+            surfaces.append(surface)
+            shown.append(part)
+    if not surfaces:
+        raise SceneError(
+            f'"{target.name}" has no faces, so there is nothing to refine as an asset; add faces, or choose another '
+            "object or collection"
+        )
+    counts = [len(part.matrices) for part in shown]
+    source = AssetSource(
+        name=target.name,
+        surfaces=tuple(surfaces),
+        surface=np.repeat(np.arange(len(surfaces)), counts).astype(np.int32),
+        matrices=np.concatenate([part.matrices for part in shown]),
+        digest=digest,
+    )
+    if not np.isfinite(source.matrices).all():
+        raise SceneError(
+            f'"{target.name}" shows instances whose place is not a finite number; correct the nodes or particles that '
+            "make them"
+        )
+    return source, tuple(reader.warnings)
+
+
+def _surface_steps(
+    part: AssetPart, depsgraph: bpy.types.Depsgraph, reader: FaceReader
+) -> Generator[float, None, AssetSurface | None]:
+    """Read one mesh; None if it has no faces. Between two steps nothing of Blender's meshes is held."""
+    with part.opened(depsgraph) as opened:
+        if opened is None:
+            return None
+        mesh, slots = opened
+        positions = read(mesh, "position")
+        if not np.isfinite(positions).all():
+            raise SceneError(f'"{part.name}" has vertices that are not finite numbers; delete them')
+        mesh.calc_loop_triangles()
+        faces = len(mesh.polygons)
+        loops = members(mesh.loop_triangles, "loops", 3, np.int32)
+        face = members(mesh.loop_triangle_polygons, "value", dtype=np.int32)
+        corner_verts = read(mesh, ".corner_vert")
+        looks = reader.prepare(mesh, slots)
+    yield 0.0
+    found = yield from looks.steps(faces, positions, loops, corner_verts, face)
+    # Vertices of triangles from their corners, in the same array.
+    for start in range(0, len(loops), _TRIANGLES):
+        piece = loops[start : start + _TRIANGLES]
+        piece[:] = np.take(corner_verts, piece)
+    return AssetSurface(name=part.name, positions=positions, triangles=loops, face=face, **found)
+
 
 #: Instances up to which something that has nothing else is a group of assets; what has more is an asset of many parts.
 MOST_IN_GROUP = 256
@@ -173,7 +550,7 @@ def read_scatters(objects: list[bpy.types.Object], depsgraph: bpy.types.Depsgrap
         if is_listed(obj):
             slow.append(obj)
         else:
-            walk.shown(obj, world_matrix(obj, depsgraph)[None].astype(np.float64), name_keys([obj]))
+            walk.within(obj, world_matrix(obj, depsgraph)[None].astype(np.float64), name_keys([obj]))
     if slow:
         _one_by_one({obj: found[obj] for obj in slow}, depsgraph)
     for walk in found.values():
@@ -226,20 +603,15 @@ class Scatter:
             if len(keys):
                 self.places.append(Places(target, matrices, keys, (self.owner,)))
 
-    def shown(self, obj: bpy.types.Object, places: Floats, keys: NDArray, depth: int = 0) -> None:
-        """Take what an object instances."""
-        if obj.instance_type == 'COLLECTION' and obj.instance_collection is not None:
-            self.take(obj.instance_collection, places, keys, depth + 1)
-        if has_nodes(obj) and (geometry := geometry_of(obj, self.depsgraph)) is not None:
-            self._instances(geometry, places, keys, depth + 1)
+    def within(self, shown: Reference, places: Floats, keys: NDArray, depth: int = 0) -> None:
+        """Take what something instances; a group within a group of objects is deeper."""
+        for one in instanced_by(shown, places, keys, self.depsgraph):
+            self.take(*one, depth + isinstance(shown, bpy.types.Object))
 
     def take(self, shown: Reference, places: Floats, keys: NDArray, depth: int) -> None:
         """Take an asset, or what a group of them holds."""
         if depth <= DEEPEST and self._is_group(shown):
-            if isinstance(shown, bpy.types.Object):
-                self.shown(shown, places, keys, depth)
-            else:
-                self._instances(shown, places, keys, depth)
+            self.within(shown, places, keys, depth)
         elif isinstance(shown, bpy.types.GeometrySet):
             name = shown.name or self.owner.name
             self.add(Target(datablock=None, geometry=shown, owner=self.owner, name=name), places, keys)
@@ -254,10 +626,6 @@ class Scatter:
             self._parts.setdefault(target, []).append((places, keys))
         else:
             self.left[target.name] = self.left.get(target.name, 0) + len(keys)
-
-    def _instances(self, geometry: bpy.types.GeometrySet, places: NDArray, keys: NDArray, depth: int) -> None:
-        for one in instanced(geometry, places, keys):
-            self.take(*one, depth)
 
     def _is_group(self, shown: Reference) -> bool:
         """Whether something has no surface of its own, and instances a few others."""

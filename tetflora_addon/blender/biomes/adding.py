@@ -36,8 +36,7 @@ from ..placing.rules import biomes_in, set_grounds
 from ..placing.terrain import grid_mesh, read_ground
 from ..runtime import GoneError, JobData, is_there, job
 from ..scene.crowns import crown_for
-from ..scene.field_sizes import has_history
-from ..scene.fields import fields_of, read_field
+from ..scene.fields import fields_of, has_history, read_field
 from ..settings import BIOME, SCATTER, with_identity
 from ..species.edits import catalog, new_identifier, species_data, store_species, unknown_text
 from ..stands.growing import GrownStand, again_steps, new_stand_steps

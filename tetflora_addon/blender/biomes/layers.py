@@ -15,8 +15,7 @@ from ..placing.plant_objects import PAINTED_MARK, note_field, plant_collection
 from ..placing.populations import add_population
 from ..placing.rules import BIOME_ONLY, awaits_update, copy_settings, grounds_of, set_grounds
 from ..runtime import Handlers
-from ..scene.field_sizes import has_history
-from ..scene.fields import stored_size
+from ..scene.fields import has_history, stored_size
 from ..settings import BIOME, FIELD, SCATTER, active_in
 from ..stands.growing import stand_settings_now
 

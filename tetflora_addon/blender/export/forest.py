@@ -30,9 +30,7 @@ from ..attributes import world_matrix
 from ..job.contents import compile_for, in_year
 from ..runtime import JobData, job
 from ..scene.ages import classed
-from ..scene.field_points import AGE
-from ..scene.field_sizes import FIT, NUMBERS, OFFSET
-from ..scene.fields import stored_points
+from ..scene.fields import AGE, FIT, NUMBERS, OFFSET, stored_points
 from ..scene.plants import Source, merged, read_sources
 from ..scene.skeletons import skeleton_object_of
 from ..worker import call_in_thread, steps_in_thread

@@ -1,9 +1,13 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Fields of trees from inventories, and from rasters of canopy height: each tree has the size that is recorded."""
+"""Fields of trees from inventories, and from rasters of canopy height: each tree has the size that is recorded.
 
+A dialog shows the columns of an inventory, with their titles and some values, and what they are taken for.
+"""
+
+import json
 from collections import Counter
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from math import tau
@@ -18,7 +22,7 @@ from ...compiled.recorded_sizes import Sizes, fits_of
 from ...compiled.sizes import crown_of
 from ...errors import SceneError, SpeciesError
 from ...geodata.canopy import checked_canopy, find_trees, heights_above, without_areas
-from ...geodata.inventories import Inventory, read_inventory
+from ...geodata.inventories import FIELDS, Inventory, preview, read_inventory
 from ...geodata.projection import MapOrigin
 from ...geodata.species_names import GENUS, KIN, KIND, best_of, name_counts, words_of
 from ...growth.axes import profile
@@ -31,13 +35,63 @@ from ...planting.rules import species_by_weight
 from ...species.ages import ages_of
 from ...species.species import Species
 from ..attributes import write
+from ..declare import HIDDEN, choice, string
 from ..placing.plant_objects import add_field
-from ..scene.field_sizes import FIT, HEIGHT, NUMBERS, OFFSET, SIZE_ATTRIBUTES
+from ..scene.fields import FIT, HEIGHT, NUMBERS, OFFSET, SIZE_ATTRIBUTES
 from ..species.edits import catalog, grown, species_for
 from ..worker import call_in_thread, steps_in_thread
 from .origin import Import, Imported, Steps, importing
-from .outlines import building_areas
-from .terrain import heights_steps, read_raster
+from .terrain import building_areas, heights_steps, read_raster
+
+_UNITS = ("Meters", "Centimeters", "Millimeters", "Feet", "Inches")
+
+
+class TetFloraInventoryColumn(bpy.types.PropertyGroup):
+    """A column, whose title is the name."""
+
+    field: choice(
+        "Meaning", "What the column holds", [(name.upper() or 'NONE', label, "") for name, label in FIELDS.items()]
+    )
+    unit: choice(
+        "Unit",
+        "Unit of its numbers, where neither they nor the title name one",
+        [
+            ('AUTO', "Automatic", ""),
+            *((unit, label, "") for unit, label in zip(("m", "cm", "mm", "ft", "in"), _UNITS, strict=True)),
+        ],
+    )
+    values: string("Values", **HIDDEN)
+
+
+def show_columns(table: bpy.types.bpy_prop_collection, path: Path) -> None:
+    """Fill a table with the columns of a file. Errors are those of `preview`."""
+    for column in preview(path):
+        row = table.add()
+        row.name, row.field, row.values = column.title, column.field.upper() or 'NONE', ", ".join(column.values)
+
+
+def chosen_columns(table: Iterable[TetFloraInventoryColumn]) -> str:
+    """What was chosen for columns, as scripts write it."""
+    chosen = {row.name: row.field.lower() if row.field != 'NONE' else "" for row in table}
+    return json.dumps(chosen | {row.name: f"{chosen[row.name]} {row.unit}" for row in table if row.unit != 'AUTO'})
+
+
+def columns_in(text: str) -> dict[str, str]:
+    """What columns hold by their titles, from JSON.
+
+    Raises
+    ------
+    SceneError
+        It is none.
+    """
+    try:
+        columns = json.loads(text or "{}")
+    except (ValueError, RecursionError) as error:
+        raise SceneError(f"Columns is not valid JSON: {error}") from None
+    if not isinstance(columns, dict) or not all(isinstance(value, str) for value in columns.values()):
+        raise SceneError('Columns is not a JSON object of texts, such as {"H": "height"}')
+    return columns
+
 
 _AGES, _BREAST, _PLANTS = 96, 1.3, 16
 _TALLER = 1.6  # at most, than what the curves of a species come to

@@ -26,9 +26,7 @@ from ..runtime import Handlers, Outlook
 from ..scene.ages import crown_kinds
 from ..scene.camera import read_camera
 from ..scene.crowns import crown_to_draw
-from ..scene.field_points import AGE, PREFIX, sound_ages
-from ..scene.field_sizes import HEIGHT, stored_now
-from ..scene.fields import field_kinds
+from ..scene.fields import AGE, HEIGHT, PREFIX, field_kinds, sound_ages, stored_now
 from ..scene.objects import objects_within, renderable_objects
 from ..settings import most_memory, season_of
 from ..species.edits import display_height, species_for

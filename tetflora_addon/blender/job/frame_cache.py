@@ -17,9 +17,8 @@ from ...camera.camera import Camera
 from ...camera.view_cells import Around, ViewCells, cell_camera
 from ...growth.seeds import farthest
 from ...species.kinds import species_of
-from ...species.species import Species
 from ..assets.marks import reach_of
-from ..assets.parts import digest_of
+from ..assets.places import digest_of
 from ..compat import drawn_disc
 from ..materials.snow import has_snow
 from ..preferences import preferences
@@ -34,7 +33,6 @@ from ..species.asset_species import asset_species
 from ..species.edits import species_for
 from .contents import SceneContents, load_for, read_scene, settings_from
 
-_MAX_SPECIES = 64
 _CHOICES = ("proxy_kind", "baked_light", "expand_everything", "asset_detail")
 #: Settings of a scene that results do not depend on.
 _IGNORED = {"statistics", "share_frames", "cell_length", "cell_turn"}
@@ -54,8 +52,6 @@ class _Entry:
 
 #: By digest, least recently used first.
 _entries: dict[str, _Entry] = {}
-#: Digests of species by id of the object, which is held so that no other gets its id.
-_of_species: dict[int, tuple[Species, str]] = {}
 
 
 def scene_digest(
@@ -104,7 +100,7 @@ def scene_digest(
             for p in given.places
         ],
         choices(scene),
-        [_digest_of_species(one) for one in species],
+        species,
         [brought_materials(scene, identifier) for identifier in given.species],
     ):
         add_to_digest(content, part)
@@ -121,17 +117,6 @@ def choices(scene: bpy.types.Scene) -> list:
     season = season_of(scene)
     moment = wind_of(scene), season and replace(season, snow=float(has_snow(scene))), years_of(scene)
     return [settings_from(scene), chosen, materials, assets, *moment, drawn_disc(scene.render.engine)]
-
-
-def _digest_of_species(species: Species) -> str:
-    """Digest of a species; species never change, so it is computed once."""
-    if id(species) not in _of_species:
-        if len(_of_species) >= _MAX_SPECIES:
-            _of_species.clear()
-        content = hashlib.sha256()
-        add_to_digest(content, species)
-        _of_species[id(species)] = species, content.hexdigest()
-    return _of_species[id(species)][1]
 
 
 def add_to_digest(content: "hashlib._Hash", value: object) -> None:

@@ -18,15 +18,16 @@ from ...errors import SceneError
 from ...growth.seeds import Seeds
 from ...jobs import Job, Progress
 from ...species.species import Species
-from ..attributes import frames_of, world_matrix, write
+from ..attributes import write
 from ..results.hiding import artists_flags
 from ..results.leaf_objects import leaf_objects, materials_of
 from ..results.meshes import write_mesh
 from ..results.output import remove_made
 from ..runtime import JobData, is_there, job
 from ..scene.ages import classed
-from ..scene.field_points import stored_ages
+from ..scene.fields import stored_ages
 from ..scene.looks import LIKE, look_like
+from ..scene.plants import single_plants
 from ..scene.skeletons import kind_of
 from ..worker import call_in_thread
 from .contents import check_fits, compile_for, in_year, memory_left
@@ -94,16 +95,8 @@ def make_plant_mesh_steps(data: JobData, plants: Iterable[bpy.types.Object]) -> 
     """
     scene, depsgraph, plants = data.scene, data.depsgraph, list(plants)
     data.add_objects([*plants, *leaf_objects(scene).values()])
-    world = np.array([world_matrix(p, depsgraph) for p in plants]).reshape(-1, 4, 4)
-    frame, scale, sound = frames_of(world[:, :3, :3])
-    for plant, good in zip(plants, sound, strict=True):
-        if not good:
-            raise SceneError(
-                f'"{plant.name}": zero scale, a scale above 100,000, or an invalid position; '
-                "clear them with Alt S and Alt G"
-            )
-    ages = stored_ages(plants)
-    seeds = [single_seed(kind_of(p), p.tetflora.seed, f) for p, f in zip(plants, frame, strict=True)]
+    placed, ages = single_plants(plants, depsgraph), stored_ages(plants)
+    seeds = [single_seed(kind_of(p), p.tetflora.seed, f) for p, f in zip(plants, placed.frame, strict=True)]
     each = [None] * len(plants) if ages is None else ages.reshape(-1, 1)
     seeds = [aged for _, aged in classed(scene, [("", s, age, None) for s, age in zip(seeds, each, strict=True)])]
     kinds = dict.fromkeys(s.identifiers[0] for s in seeds)
@@ -123,8 +116,8 @@ def make_plant_mesh_steps(data: JobData, plants: Iterable[bpy.types.Object]) -> 
             data.check()  # it may have waited for the thread meanwhile
             mesh = plant_mesh(scene, f"{plant.name} mesh", flora.species[0], parts)
             data_made += [mesh, *mesh.materials]
-            size = scale[number] * seed.scale[0]
-            made.append(_placed(mesh, plant, frame[number] * size, world[number, :3, 3]))
+            size = placed.scale[number] * seed.scale[0]
+            made.append(_placed(mesh, plant, placed.frame[number] * size, placed.position[number]))
             data.add("a mesh that it made", made[-1], mesh)
             if plant.tetflora.enabled:
                 plant.tetflora.enabled = False

@@ -39,15 +39,14 @@ from ...refinement.loop import Refinement, step_of
 from ...refinement.settings import FIRST_LOOK, RefinementSettings
 from ...refinement.statistics import Statistics, Stopwatch
 from ...species.kinds import Kind
-from ..assets.parts import Target
-from ..assets.places import Places
+from ..assets.places import Places, Target
 from ..compat import drawn_disc
 from ..main_thread import in_main_thread
 from ..materials.materials import baked_material
 from ..results.collection import Results
 from ..results.hiding import hide_originals, originals_shown, remove_results
 from ..results.instances import add_cluster, add_cluster_instances, add_instances, add_stand_in, carrier_of
-from ..results.leaf_objects import leaf_objects, material_steps
+from ..results.leaf_objects import leaf_objects, materials_of
 from ..results.meshes import AssetMeshes, cluster_mesh_steps, mesh_steps, read_mesh
 from ..results.output import adopt_materials, release_materials, result_collections
 from ..results.proxies import Baking, write_proxies
@@ -56,12 +55,14 @@ from ..runtime import JobData, guarded
 from ..scene.camera import read_camera
 from ..scene.objects import taking_part
 from ..worker import call_in_thread, nobody_waits, run_to_end, steps_in_thread, written
-from .assets import SceneAssets, asset_warnings, bind_steps, is_plain
 from .contents import (
+    SceneAssets,
     SceneContents,
+    asset_warnings,
+    bind_steps,
     check_expanded,
-    compile_for,
     in_wind,
+    is_plain,
     load_for,
     memory_left,
     read_scene,
@@ -252,7 +253,7 @@ def _write_blocks(run: _Run, blocks: Iterator[Block], start: float) -> Job[None]
             if run.baking is not None and run.baking.leaves:
                 materials[what] = [baked_material()]
             else:
-                materials[what] = yield from material_steps(run.results.scene, species, block.kind, block.form)
+                materials[what] = materials_of(run.results.scene, species, block.kind, block.form)
             run.results.use(materials[what])  # from now on, as Esc may come before its first object
         name = f"{species.name} {block.kind} {block.number:03d}"
         yield
@@ -329,31 +330,18 @@ def refine_steps(
 ) -> Job[Statistics]:
     """Refine a scene step by step.
 
-    Closing the generator, or an error, leaves the scene as it was. Earlier results are replaced at the end. Send True
-    while it refines to go on to meshes with the current state; the statistics are then not complete.
+    Closing the generator, or an error, leaves the scene as it was. Earlier results are replaced at the end, but for
+    those ``beside``, of other view layers. Send True while it refines to go on to meshes with the current state; the
+    statistics are then not complete.
 
-    Parameters
-    ----------
-    depsgraph : bpy.types.Depsgraph
-        Evaluated for the frame.
-    for_render : bool
-        Results get a collection of their own beside the artist's, and are refined for the render region.
-    beside : sequence of bpy.types.Collection
-        Earlier results that stay: those of other view layers.
-    camera : Camera, optional
-        Instead of the scene's current one.
-    given : Given, optional
-        From `read_scene` for the scene.
-    mark : str
-        Suffix of the names of results.
-    first_look : bool
-        Show a coarse result within a second or so, while the job goes on, where somebody looks and it takes longer.
-        That one replaces earlier results already, and stays when the job is closed.
+    The dependency graph is evaluated for the frame. ``for_render``: results get a collection of their own beside the
+    artist's, and are refined for the render region. ``camera`` and ``given``, from `read_scene`, take the place of the
+    scene's own. ``mark`` is a suffix of the names of results. ``first_look``: show a coarse result within a second or
+    so, while the job goes on, where somebody looks and it takes longer; that one replaces earlier results already, and
+    stays when the job is closed.
 
-    Raises
-    ------
-    TetFloraError
-        No camera, nothing to refine, unknown species, unusable plants or meshes; the message says which.
+    Raises `TetFloraError`: no camera, nothing to refine, unknown species, unusable plants or meshes; the message says
+    which.
     """
     data = JobData("Refine", scene, depsgraph)
     if camera is None and scene.camera is not None:
@@ -463,19 +451,6 @@ def _replace(run: _Run) -> None:
 def refine(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, **options: object) -> Statistics:
     """Refine a scene at once; options and errors as for `refine_steps`."""
     return run_to_end(refine_steps(scene, depsgraph, **options))
-
-
-def partition(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> tuple[Camera, Refinement]:
-    """Camera and tetrahedra after refinement, without making anything; for images of the partition.
-
-    Both count from the camera's `origin`. Errors are those of `refine_steps`.
-    """
-    camera = read_camera(scene, depsgraph).local()
-    given = read_scene(scene, depsgraph).counted_from(camera.origin)
-    flora = in_wind(scene, compile_for(given.species, scene, depsgraph), camera)
-    bound = run_to_end(bind_steps(scene, given.places, depsgraph, camera, memory_left(scene, camera)))
-    settings = refinement_settings(scene)
-    return camera, run_to_end(_run_loop(_Run(depsgraph, camera, given, flora=flora, bound=bound, settings=settings)))
 
 
 def clear(scene: bpy.types.Scene, for_render: bool | None = None) -> int:

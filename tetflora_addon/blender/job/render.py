@@ -40,8 +40,7 @@ from ..scene.objects import has_contents, has_plants, show_in, view_layer_groups
 from ..scene.plants import NoPlantsError
 from ..species.edits import looked_at_once
 from . import frame_cache, refine
-from .assets import asset_warnings
-from .contents import read_scene
+from .contents import asset_warnings, read_scene
 
 
 @dataclass

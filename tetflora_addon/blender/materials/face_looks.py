@@ -44,16 +44,6 @@ class Pyramid:
     width: Floats32
     height: Floats32
 
-    @property
-    def side(self) -> float:
-        """Texels across in the finest copy: the root of their number."""
-        return float(np.sqrt(self.width[0] * self.height[0]))
-
-    @property
-    def levels(self) -> int:
-        """Number of copies l."""
-        return len(self.start)
-
     def look(self, u: Floats32, v: Floats32, size: Floats32, extension: str) -> tuple[Floats32, Floats32]:
         """Mean colors (3, p, k) and alpha (p, k) around some points.
 
@@ -67,7 +57,7 @@ class Pyramid:
         with np.errstate(divide="ignore"):
             # Of long images the short side counts: more noise, but nothing from beside the square.
             level = np.floor(np.log2(size * min(self.width[0], self.height[0])))
-        level = np.clip(np.nan_to_num(level), 0, self.levels - 1).astype(np.int32)
+        level = np.clip(np.nan_to_num(level), 0, len(self.start) - 1).astype(np.int32)
         outside = None
         if extension == 'CLIP':
             outside = (u < 0) | (u > 1) | (v < 0) | (v > 1)
@@ -244,10 +234,6 @@ class Plan:
             self.maps.append(name)
         return _ANYWHERE
 
-    def is_map(self, name: str) -> bool:
-        """Whether an attribute holds texture coordinates."""
-        return self.layers.types.get(name) == 'FLOAT2'
-
     def attribute(self, name: str) -> Values:
         """A color attribute (4, p, k)."""
         exists = name in self.layers.types
@@ -275,7 +261,7 @@ class Plan:
         if image.source == 'TILED':
             self.tell(f'The image "{image.name}" of material "{self.name}" has several tiles; the first stands for all')
         self.images.add(image)
-        self.texels = max(self.texels, pyramid.side * scale)
+        self.texels = max(self.texels, float(np.sqrt(pyramid.width[0] * pyramid.height[0])) * scale)
         return pyramid
 
     def mark_uneven(self) -> None:

@@ -5,7 +5,6 @@
 All share one scattering group, so that proxies match what they replace.
 """
 
-from collections.abc import Iterator
 from typing import Any
 
 import bpy
@@ -13,10 +12,10 @@ import bpy
 from ...emission.light import BACK, FRONT
 from ...optics import GLOSS, HAIRY
 from ..compat import disable_bump_correction
-from .bark import bark_group, bark_version, place_group
+from .bark import bark_group, bark_version
 from .blade import WAXY, blade_group, blade_version, paler, sheen
 from .microsphere import WHITE, scatter_group
-from .nodes import Graph, Term, is_own, surface_material
+from .nodes import Graph, Term, surface_material
 
 PROXY = "TetFlora proxy"
 SPHERE = "TetFlora microsphere"
@@ -107,21 +106,6 @@ def bark_material(species_name: str, character: str = "ridged") -> bpy.types.Mat
         material.diffuse_color = (0.18, 0.12, 0.08, 1.0)
 
     return surface_material(f"TetFlora {species_name} bark", bark_version(character), build)
-
-
-def bark_steps(species_name: str, character: str) -> Iterator[None]:
-    """What `bark_material` needs and this file has not yet, piece by piece: nodes take some hundredths of a second."""
-    before = set(bpy.data.node_groups.keys())
-    try:
-        if f"TetFlora {species_name} bark" not in bpy.data.materials:
-            place_group()
-            yield
-            bark_group(character)
-            yield
-    except GeneratorExit:  # Esc, before there is a material that uses them and goes with the results
-        while made := [g for g in bpy.data.node_groups if g.name not in before and is_own(g) and not g.users]:
-            bpy.data.batch_remove(made)  # groups, then those within them
-        raise
 
 
 def proxy_material(own: bool = False) -> bpy.types.Material:

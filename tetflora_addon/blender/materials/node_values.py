@@ -365,7 +365,7 @@ class NodeValues:
         if node.type == 'ATTRIBUTE' and node.attribute_type != 'GEOMETRY':
             return self._unknown(node, socket, stack)
         name = node.attribute_name if node.type == 'ATTRIBUTE' else node.layer_name
-        if self._points.is_map(name) and socket.identifier in {"Color", "Vector"}:
+        if self._points.layers.types.get(name) == 'FLOAT2' and socket.identifier in {"Color", "Vector"}:
             return self._uv(name)
         values = self._points.attribute(name)
         if socket.identifier == "Alpha":

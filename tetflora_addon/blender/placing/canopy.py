@@ -19,8 +19,7 @@ from ...species.kinds import species_of
 from ..attributes import world_matrix
 from ..scene.ages import crown_kinds, with_sizes
 from ..scene.crowns import crown_for
-from ..scene.field_points import stored_ages
-from ..scene.fields import field_kinds, fields_of, read_aged_field
+from ..scene.fields import field_kinds, fields_of, read_aged_field, stored_ages
 from ..worker import run_to_end
 
 _kept: dict[str, Floor] = {}  # the last one, by content: settings change more often than the plants above

@@ -24,9 +24,16 @@ from .. import settings
 from ..attributes import KINDS, read, values_of, world_matrix, write
 from ..saved_files import VERSION
 from ..scene.ages import plainly_aged, relative_heights
-from ..scene.field_points import stored_ages
-from ..scene.field_sizes import has_history
-from ..scene.fields import FIELD_ATTRIBUTES, field_kinds, fields_of, read_aged_field, stored_size, write_field
+from ..scene.fields import (
+    FIELD_ATTRIBUTES,
+    field_kinds,
+    fields_of,
+    has_history,
+    read_aged_field,
+    stored_ages,
+    stored_size,
+    write_field,
+)
 from ..scene.plants import single_plants
 from ..scene.skeletons import kind_of_choice, skeleton_object_of
 from ..species.edits import catalog, display_height

@@ -31,7 +31,7 @@ from .output import (
     parent_of,
     remove_collection,
     remove_made,
-    remove_sources,
+    remove_unused,
     result_collections,
 )
 
@@ -216,7 +216,7 @@ class Results:
         else:
             self.scene.collection.children.link(self.collection)
             mark_runtime(self.collection, True)
-        remove_sources(self._held)  # that nothing shows
+        remove_unused(self._held)  # that nothing shows
 
     def discard(self) -> None:
         """Remove everything made so far, whatever of it or of the scene somebody else has removed."""

@@ -2,7 +2,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Leaves and blossoms that are the artist's mesh objects: their polygons and materials."""
 
-from collections.abc import Generator
 from dataclasses import replace
 from itertools import pairwise
 from math import tau
@@ -20,7 +19,7 @@ from ...leaves.surfaces import Needles
 from ...species.kinds import species_of
 from ...species.species import LEAF_KINDS, Species
 from ..attributes import mesh_of
-from ..materials.materials import bark_material, bark_steps, leaf_material
+from ..materials.materials import bark_material, leaf_material
 from ..materials.nodes import is_ours
 from ..scene.skeletons import read_skeleton, skeleton_object_of
 from ..species.edits import species_for
@@ -231,15 +230,6 @@ def materials_of(scene: bpy.types.Scene, species: Species, kind: str, form: int)
     if any(own):
         return own
     return [_in_viewports(species_leaf_material(species, kind), species, kind)]
-
-
-def material_steps(
-    scene: bpy.types.Scene, species: Species, kind: str, form: int
-) -> Generator[None, None, list[bpy.types.Material]]:
-    """`materials_of` in steps."""
-    if kind == "bark" and replaced_material(scene, species.identifier, kind) is None:
-        yield from bark_steps(species.name, species.bark)
-    return materials_of(scene, species, kind, form)
 
 
 def brought_materials(scene: bpy.types.Scene, kind_of_plant: str) -> list[list[str]]:

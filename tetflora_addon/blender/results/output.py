@@ -118,23 +118,29 @@ def mark_runtime(collection: bpy.types.Collection, runtime: bool) -> None:
         source.is_runtime_data = runtime
 
 
+def _reached(datablocks: Iterable[bpy.types.ID | None]) -> list[bpy.types.ID]:
+    """Those of some datablocks that TetFlora made in this file, and of what they use, each once."""
+    found: dict[bpy.types.ID, None] = {}
+    waiting = list(datablocks)
+    while waiting:
+        one = waiting.pop()
+        if one is None or one in found or not is_own(one):
+            continue
+        found[one] = None
+        waiting += getattr(one, "materials", ())
+        if isinstance(one, bpy.types.Object):
+            waiting += [one.data, one.get(SOURCE), *(m.node_group for m in one.modifiers if m.type == 'NODES')]
+        elif isinstance(one, bpy.types.Collection):
+            waiting += one.objects
+        tree = one if isinstance(one, bpy.types.NodeTree) else getattr(one, "node_tree", None)
+        waiting += [node.node_tree for node in tree.nodes if node.type == 'GROUP'] if tree is not None else ()
+    return list(found)
+
+
 def sources_of(objects: Iterable[bpy.types.Object]) -> list[bpy.types.ID]:
     """What TetFlora made for result objects to show instances of: collections, objects and their data, each once."""
-    found: dict[bpy.types.ID, None] = {}
-    waiting = list({source for obj in objects if (source := obj.get(SOURCE)) is not None and is_own(source)})
-    while waiting:
-        source = waiting.pop()
-        if source in found:
-            continue
-        found[source] = None
-        inner = [o for o in source.objects if is_own(o)] if isinstance(source, bpy.types.Collection) else [source]
-        for obj in inner:
-            found[obj] = None
-            if obj.data is not None and is_own(obj.data):
-                found[obj.data] = None
-            if (more := obj.get(SOURCE)) is not None and is_own(more):
-                waiting.append(more)
-    return list(found)
+    looks = bpy.types.Material | bpy.types.NodeTree
+    return [one for one in _reached({obj.get(SOURCE) for obj in objects}) if not isinstance(one, looks)]
 
 
 def adopt_materials(scene: bpy.types.Scene, collection: bpy.types.Collection) -> list[str]:
@@ -218,66 +224,29 @@ def remove_collection(scene: bpy.types.Scene | None, collection: bpy.types.Colle
         for child in list(collection.children):
             if child.name not in scene.collection.children:
                 scene.collection.children.link(child)
-    sources = sources_of(own)
-    data = [o.data for o in own if o.data is not None and is_own(o.data)]
-    every = [*own, *(s for s in sources if isinstance(s, bpy.types.Object))]
-    groups = _groups(every)
-    materials = {m for o in every if o.data is not None and is_own(o.data) for m in o.data.materials}
-    removed = [*own, *(d for d in data if d.users <= 1), collection]
+    used = _reached(own)
     release_copies(collection)
-    bpy.data.batch_remove(removed)
-    unused = {m for m in materials if m is not None and is_own(m)}
-    return len(removed) + remove_sources(sources) + _remove_unused(unused, groups)
+    bpy.data.batch_remove([*own, collection])
+    return len(own) + 1 + remove_unused(used)
 
 
-def remove_sources(sources: Iterable[bpy.types.ID]) -> int:
-    """Remove what results could show instances of, and nothing uses any more; returns the number removed."""
-    left, removed = [s for s in sources if is_there(s) and is_own(s)], 0
+def remove_unused(datablocks: Iterable[bpy.types.ID]) -> int:
+    """Remove what results could use, and nothing uses any more; returns the number removed."""
+    left, removed = [one for one in datablocks if is_there(one) and is_own(one)], 0
     while True:
-        unused = [s.users == 0 for s in left]
+        unused = [one.users == 0 for one in left]
         if not any(unused):
             return removed
-        bpy.data.batch_remove([s for s, gone in zip(left, unused, strict=True) if gone])
-        left = [s for s, gone in zip(left, unused, strict=True) if not gone]
+        bpy.data.batch_remove([one for one, gone in zip(left, unused, strict=True) if gone])
+        left = [one for one, gone in zip(left, unused, strict=True) if not gone]
         removed += sum(unused)
 
 
 def remove_made(datablocks: Iterable[bpy.types.ID]) -> None:
-    """Remove objects that are in no collection, and data and materials of TetFlora's that nothing uses then."""
+    """Remove objects that are in no collection, and what of TetFlora's nothing uses then; and meshes without a mark."""
     there = [datablock for datablock in dict.fromkeys(datablocks) if is_there(datablock)]
-    objects = [d for d in there if isinstance(d, bpy.types.Object) and is_own(d) and not d.users_collection]
-    sources = [*sources_of(objects), *(d for d in there if isinstance(d, bpy.types.Collection))]
-    sources += [o for c in sources if isinstance(c, bpy.types.Collection) for o in c.objects]
-    groups = _groups({*objects, *(s for s in sources if isinstance(s, bpy.types.Object))})
-    bpy.data.batch_remove(objects)
-    remove_sources(dict.fromkeys(sources))
+    used = _reached(there)
+    bpy.data.batch_remove([d for d in used if isinstance(d, bpy.types.Object) and not d.users_collection])
     data = [d for d in there if is_there(d) and isinstance(d, bpy.types.Mesh | bpy.types.PointCloud) and not d.users]
     bpy.data.batch_remove(data)
-    left = [d for d in there if is_there(d)]
-    _remove_unused({d for d in left if isinstance(d, bpy.types.Material) and is_own(d)}, groups)
-
-
-def _groups(objects: Iterable[bpy.types.Object]) -> set[bpy.types.NodeTree]:
-    """Groups of geometry nodes that objects use."""
-    return {m.node_group for o in objects for m in o.modifiers if m.type == 'NODES' and m.node_group is not None}
-
-
-def _remove_unused(materials: set[bpy.types.Material], groups: set[bpy.types.NodeTree]) -> int:
-    """Remove TetFlora's groups and materials that nothing uses any more, and the node groups of these."""
-    removed = _remove_groups(groups)  # first: groups of geometry nodes use materials
-    unused = [m for m in materials if m.users == 0]
-    groups = {n.node_tree for m in unused for n in m.node_tree.nodes if n.type == 'GROUP' and n.node_tree is not None}
-    bpy.data.batch_remove(unused)
-    return removed + len(unused) + _remove_groups(groups)
-
-
-def _remove_groups(groups: set[bpy.types.NodeTree]) -> int:
-    removed = 0
-    while True:
-        empty = [g for g in groups if g.users == 0 and is_own(g)]
-        if not empty:
-            return removed
-        inner = {n.node_tree for g in empty for n in g.nodes if n.type == 'GROUP' and n.node_tree is not None}
-        groups = (groups - set(empty)) | inner
-        bpy.data.batch_remove(empty)
-        removed += len(empty)
+    remove_unused(used)

@@ -16,7 +16,6 @@ from zlib import crc32
 
 import bpy
 import numpy as np
-from numpy.typing import NDArray
 
 from ...arrays import Floats, Floats32, Integers, Integers32, Keys
 from ...errors import SceneError
@@ -74,8 +73,6 @@ def is_drop(obj: bpy.types.Object) -> bool:
 #: What nodes instance.
 Reference = bpy.types.Object | bpy.types.Collection | bpy.types.GeometrySet
 
-_PART = 4_096  # matrices of one product
-
 
 @dataclass(frozen=True)
 class Rows:
@@ -90,23 +87,15 @@ class Rows:
         names = child_key(keys[:, None], self.number).reshape(-1)
         if own == 1 and np.array_equal(self.columns[0], np.eye(4)):  # as nodes that bring an object make it
             return matrices, names
-        places = np.zeros((many, own, 4, 4))
-        # A product of two large matrices for each of the fewer, and not one of two small ones for each of the more; in
-        # parts that stay in the processor's cache.
+        # A product of two large matrices for each of the fewer, and not one of two small ones for each of the more.
+        columns = self.columns.astype(np.float64)
         if many <= own:
-            for place, matrix in zip(places, matrices, strict=True):
-                for part in _parts(own):
-                    columns = self.columns[part].reshape(-1, 4).astype(np.float64) @ matrix.T
-                    place[part] = columns.reshape(-1, 4, 4).transpose(0, 2, 1)
+            places = columns.reshape(-1, 4) @ matrices.transpose(0, 2, 1)
+            places = places.reshape(many, own, 4, 4).transpose(0, 1, 3, 2)
         else:
-            for n, columns in enumerate(self.columns.astype(np.float64)):
-                for part in _parts(many):
-                    places[part, n] = (matrices[part].reshape(-1, 4) @ columns.T).reshape(-1, 4, 4)
-        return places.reshape(-1, 4, 4), names
-
-
-def _parts(number: int) -> Iterator[slice]:
-    return (slice(first, first + _PART) for first in range(0, number, _PART))
+            places = matrices.reshape(-1, 4) @ columns.transpose(0, 2, 1)
+            places = places.reshape(own, many, 4, 4).transpose(1, 0, 2, 3)
+        return np.ascontiguousarray(places).reshape(-1, 4, 4), names
 
 
 def references_of(geometry: bpy.types.GeometrySet) -> Iterator[tuple[Reference, Rows]]:
@@ -125,15 +114,6 @@ def references_of(geometry: bpy.types.GeometrySet) -> Iterator[tuple[Reference, 
     for target, (start, end) in zip(references, pairwise(bounds), strict=True):
         if target is not None and start < end:
             yield target, Rows(transform[order[start:end]], number[order[start:end]])
-
-
-def instanced(
-    geometry: bpy.types.GeometrySet, matrices: Floats, keys: Keys
-) -> Iterator[tuple[Reference, Floats, Keys]]:
-    """As `references_of`, but originals, with places (k, 4, 4) and keys (k,) of all that stand in some places (n)."""
-    for target, rows in references_of(geometry):
-        original = target if isinstance(target, bpy.types.GeometrySet) else target.original
-        yield original, *rows.within(matrices, keys)
 
 
 def _read_instances(points: bpy.types.PointCloud) -> tuple[Integers32, Floats32, Integers]:
@@ -307,7 +287,8 @@ def copies_of(objects: Sequence[bpy.types.Object], depsgraph: bpy.types.Depsgrap
     """
     found: list[Copies] = []
     left: set[bpy.types.Object] = set()
-    groups: dict[tuple[bpy.types.Collection, str], list[bpy.types.Object]] = {}
+    alone: dict[tuple[Reference, str], list[bpy.types.Object]] = {}
+    groups = alone.copy()
     looks = LayerLooks(depsgraph.view_layer)
     for obj in objects:
         if is_listed(obj):
@@ -315,17 +296,12 @@ def copies_of(objects: Sequence[bpy.types.Object], depsgraph: bpy.types.Depsgrap
         elif obj.instance_type == 'COLLECTION' and obj.instance_collection is not None:
             groups.setdefault((obj.instance_collection, looks.of(obj)), []).append(obj)
         elif has_nodes(obj):
-            try:
-                walk = _Walk(depsgraph, obj)
-                walk.nodes(obj, world_matrix(obj, depsgraph)[None].astype(np.float64), name_keys([obj]))
-                found += walk.found
-            except _OneByOne:
-                left.add(obj)
-    for (collection, _), instancers in groups.items():
+            alone[obj, ""] = [obj]
+    for (shown, _), instancers in (alone | groups).items():
+        walk = _Walk(depsgraph, instancers[0])
+        matrices = np.array([world_matrix(obj, depsgraph) for obj in instancers], dtype=np.float64)
         try:
-            walk = _Walk(depsgraph, instancers[0])
-            matrices = np.array([world_matrix(obj, depsgraph) for obj in instancers], dtype=np.float64)
-            walk.collection(collection, matrices, name_keys(instancers))
+            walk.within(shown, matrices, name_keys(instancers))
             found += walk.found
         except _OneByOne:
             left.update(instancers)
@@ -341,10 +317,10 @@ def geometry_of(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> bpy.ty
         return None
 
 
-def materials_of(obj: bpy.types.Object, mesh: bpy.types.Mesh) -> list[bpy.types.Material | None]:
-    """Original materials of the slots of an object whose mesh this is; at least one slot."""
+def materials_of(obj: bpy.types.Object | None, mesh: bpy.types.Mesh) -> list[bpy.types.Material | None]:
+    """Original materials of the slots of a mesh, which may be an object's; at least one slot."""
     found = [material.original if material is not None else None for material in mesh.materials] or [None]
-    for i, slot in enumerate(obj.material_slots):
+    for i, slot in enumerate(obj.material_slots if obj is not None else ()):
         if slot.link == 'OBJECT' and i < len(found):
             found[i] = slot.material.original if slot.material else None
     return found
@@ -364,14 +340,26 @@ def listed_instances(
             yield owner, instance
 
 
-def collected(
-    collection: bpy.types.Collection, matrices: Floats, depsgraph: bpy.types.Depsgraph
-) -> Iterator[tuple[bpy.types.Object, Floats]]:
-    """What instances (n, 4, 4) of a collection show in renders, by name: each object with its places (n, 4, 4)."""
-    back = np.eye(4)
-    back[:3, 3] = -np.array(collection.instance_offset)
-    for obj in sorted(rendered_objects(collection), key=lambda o: o.name_full):
-        yield obj, matrices @ (back @ world_matrix(obj, depsgraph))
+def instanced_by(
+    shown: Reference, matrices: Floats, keys: Keys, depsgraph: bpy.types.Depsgraph
+) -> Iterator[tuple[Reference, Floats, Keys]]:
+    """What something in some places (n, 4, 4) with their keys (n,) instances at its first level, each with all places.
+
+    Of collections it is what renders, by name. What `is_listed` has to be looked for in Blender's own list.
+    """
+    if isinstance(shown, bpy.types.Collection):
+        back = np.eye(4)
+        back[:3, 3] = -np.array(shown.instance_offset)
+        for n, obj in enumerate(sorted(rendered_objects(shown), key=lambda o: o.name_full)):
+            yield obj, matrices @ (back @ world_matrix(obj, depsgraph)), child_key(keys, n)
+        return
+    if isinstance(shown, bpy.types.Object):
+        if shown.instance_type == 'COLLECTION' and shown.instance_collection is not None:
+            yield shown.instance_collection, matrices, keys
+        shown = geometry_of(shown, depsgraph) if has_nodes(shown) else None
+    for target, rows in references_of(shown) if shown is not None else ():
+        original = target if isinstance(target, bpy.types.GeometrySet) else target.original
+        yield original, *rows.within(matrices, keys)
 
 
 def rendered_objects(collection: bpy.types.Collection) -> Iterator[bpy.types.Object]:
@@ -392,44 +380,25 @@ class _Walk:
     """Follows references down to plants and fields, with all places at once."""
 
     def __init__(self, depsgraph: bpy.types.Depsgraph, instancer: bpy.types.Object) -> None:
-        self.depsgraph, self.instancer = depsgraph, instancer
+        self._depsgraph, self._instancer = depsgraph, instancer
         self.found: list[Copies] = []
-        self._depth = 0
 
-    def object(self, obj: bpy.types.Object, matrices: Floats, keys: Keys) -> None:
-        if obj.hide_render or self._depth == DEEPEST:
-            return
-        self._depth += 1
-        group = obj.tetflora
-        if group.is_plant or group.is_field:
-            self.found.append(Copies(obj, None, matrices, keys, self.instancer))
-        if is_listed(obj):
-            raise _OneByOne
-        if obj.instance_type == 'COLLECTION' and obj.instance_collection is not None:
-            self.collection(obj.instance_collection, matrices, keys)
-        if has_nodes(obj):
-            self.nodes(obj, matrices, keys)
-        self._depth -= 1
-
-    def collection(self, collection: bpy.types.Collection, matrices: NDArray, keys: Keys) -> None:
-        for n, (obj, places) in enumerate(collected(collection, matrices, self.depsgraph)):
-            self.object(obj, places, child_key(keys, n))
-
-    def nodes(self, obj: bpy.types.Object, matrices: Floats, keys: Keys) -> None:
-        geometry = geometry_of(obj, self.depsgraph)
-        if geometry is not None:
-            self._instances(obj, geometry, matrices, keys)
-
-    def _instances(self, owner, geometry: bpy.types.GeometrySet, matrices: NDArray, keys: Keys) -> None:
-        for target, places, names in instanced(geometry, matrices, keys):
-            if isinstance(target, bpy.types.Collection):
-                self.collection(target, places, names)
-            elif isinstance(target, bpy.types.GeometrySet):
-                if owner.tetflora.is_field:
-                    self.found.append(Copies(owner, target, places, names, self.instancer))
-                self._instances(owner, target, places, names)
-            elif may_take_part(target) or len(target.particle_systems):
-                self.object(target, places, names)
+    def within(
+        self, shown: Reference, matrices: Floats, keys: Keys, owner: bpy.types.Object | None = None, depth: int = 0
+    ) -> None:
+        """Take what something instances; of geometry, the object whose nodes made it is the owner."""
+        owner = shown if isinstance(shown, bpy.types.Object) else owner
+        for one, places, names in instanced_by(shown, matrices, keys, self._depsgraph):
+            if not isinstance(one, bpy.types.Object):
+                if isinstance(one, bpy.types.GeometrySet) and owner.tetflora.is_field:
+                    self.found.append(Copies(owner, one, places, names, self._instancer))
+                self.within(one, places, names, owner, depth)
+            elif (may_take_part(one) or len(one.particle_systems)) and not one.hide_render and depth < DEEPEST:
+                if one.tetflora.is_plant or one.tetflora.is_field:
+                    self.found.append(Copies(one, None, places, names, self._instancer))
+                if is_listed(one):
+                    raise _OneByOne
+                self.within(one, places, names, None, depth + 1)
 
 
 def _one_by_one(instancers: set[bpy.types.Object], depsgraph: bpy.types.Depsgraph) -> Iterator[Copies]:

@@ -27,8 +27,7 @@ from ..settings import season_of
 from ..species.asset_species import asset_of, asset_species, find_asset, name_of
 from ..species.edits import catalog, edited_infos, species_for
 from .ages import Part, classed
-from .field_points import stored_ages
-from .fields import read_aged_field, read_field_matrices
+from .fields import read_aged_field, read_field_matrices, stored_ages
 from .looks import LayerLooks
 from .motion import exposure, moment, moves
 from .objects import Copies, copies_of, is_drop, may_instance, may_take_part, name_keys, renderable_objects

@@ -13,6 +13,7 @@ import zlib
 from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import bpy
 import numpy as np
@@ -50,12 +51,20 @@ class TetFloraAssetSpecies(bpy.types.PropertyGroup):
     picture: string("Picture", "Small picture for menus, as compressed pixels")
 
 
-def entries_of(scene: bpy.types.Scene | None = None) -> Iterator[TetFloraAssetSpecies]:
-    """Asset species of this file, those of a scene first; identifiers that break the rule are as good as absent."""
+def listed_in(entries: str, scene: bpy.types.Scene | None = None) -> Iterator[Any]:
+    """Entries of a list that all scenes have, those of a scene first.
+
+    Those whose identifiers break the rule are as good as absent, for paths are made of them.
+    """
     # While add-ons are enabled at startup bpy.data has nothing.
     others = [s for s in getattr(bpy.data, "scenes", ()) if s != scene]
     for one in ([scene] if scene is not None else []) + others:
-        yield from (entry for entry in one.tetflora.asset_species if is_identifier(entry.identifier))
+        yield from (entry for entry in getattr(one.tetflora, entries) if is_identifier(entry.identifier))
+
+
+def entries_of(scene: bpy.types.Scene | None = None) -> Iterator[TetFloraAssetSpecies]:
+    """Asset species of this file, those of a scene first."""
+    return listed_in("asset_species", scene)
 
 
 def find_asset(scene: bpy.types.Scene | None, identifier: str) -> TetFloraAssetSpecies | None:

@@ -431,19 +431,14 @@ _MAKERS: dict[str, Callable[[str, Key], dict[str, Any]]] = {
 }
 
 
-def _annotations() -> dict[str, Any]:
-    made: dict[str, Any] = {}
-    for name, key in ORDER_KEYS.items():
-        made |= _MAKERS[key.kind](name, key)
-    return made
-
-
 #: ``Scene.tetflora.species_editor``: what the panel shows, and a property for each key of an order.
 TetFloraSpeciesEditor = type(
     "TetFloraSpeciesEditor",
     (bpy.types.PropertyGroup, WholeSpecies),
     {
-        "__annotations__": _annotations(),
+        "__annotations__": {
+            name: made for of, key in ORDER_KEYS.items() for name, made in _MAKERS[key.kind](of, key).items()
+        },
         "__doc__": "What the species editor shows; values come from the species' JSON and go there.",
         "__module__": __name__,
     },

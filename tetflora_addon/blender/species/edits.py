@@ -40,7 +40,7 @@ from ...species.species import Species
 from ..declare import string
 from ..preferences import species_folders
 from ..runtime import Handlers, Listeners
-from .asset_species import asset_infos, find_asset, name_of, refuse_asset
+from .asset_species import asset_infos, find_asset, listed_in, name_of, refuse_asset
 
 #: Custom property of collections: JSON of species by their identifiers, see `pack`.
 PAGES = "tetflora_pages"
@@ -161,11 +161,8 @@ def _pages(text: str) -> tuple[Page, ...]:
 
 
 def edits_of_scenes(scene: bpy.types.Scene | None) -> Iterator[TetFloraSpeciesEdit]:
-    """Edits of scenes; those whose identifiers break the rule are as good as absent, for paths are made of them."""
-    # While add-ons are enabled at startup bpy.data has nothing.
-    others = [s for s in getattr(bpy.data, "scenes", ()) if s != scene]
-    for one in ([scene] if scene is not None else []) + others:
-        yield from (edit for edit in one.tetflora.species_edits if is_identifier(edit.identifier))
+    """Edits of this file, those of a scene first."""
+    return listed_in("species_edits", scene)
 
 
 def species_for(scene: bpy.types.Scene | None, identifier: str) -> Species:

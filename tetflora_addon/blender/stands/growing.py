@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Grow a stand as a job, and make a field of its records: each point is a plant in one year (`scene.field_sizes`)."""
+"""Grow a stand as a job, and make a field of its records: each point is a plant in one year (`scene.fields`)."""
 
 import time
 from collections.abc import Callable, Iterable
@@ -27,8 +27,7 @@ from ..placing.plant_objects import link_field
 from ..placing.rules import digest, zone_values, zoned
 from ..placing.terrain import read_ground
 from ..runtime import JobData, is_there, job
-from ..scene.field_points import read_points
-from ..scene.field_sizes import (
+from ..scene.fields import (
     FIT,
     OFFSET,
     PLANT,
@@ -36,13 +35,15 @@ from ..scene.field_sizes import (
     YEAR,
     YEAR_PATH,
     clear_years,
+    field_kinds,
     has_history,
     in_year,
+    read_points,
     read_records,
     read_sizes,
+    write_field,
     year_curves,
 )
-from ..scene.fields import field_kinds, write_field
 from ..settings import check_limits
 from ..species.edits import catalog, species_for
 from ..worker import call_in_thread, steps_in_thread

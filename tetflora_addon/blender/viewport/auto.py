@@ -30,7 +30,7 @@ from ..results.leaf_objects import leaf_objects
 from ..results.output import PURPOSE, remove_collection, result_collections
 from ..runtime import GoneError, Handlers, call_off, call_soon, redraw, with_uid
 from ..scene.camera import view_camera
-from ..scene.field_sizes import stand_years
+from ..scene.fields import stand_years
 from ..settings import season_of, wind_of, years_of
 from .state import camera_now
 

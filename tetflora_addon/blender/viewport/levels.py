@@ -34,14 +34,13 @@ from ...preview.light_plants import (
 )
 from ...preview.running import InView, in_view, shown
 from ...refinement.loop import refine as refine_loop
-from ..job.assets import bind_steps
-from ..job.contents import compile_for, in_year, load_for, memory_left, read_scene, refinement_settings
+from ..job.contents import bind_steps, compile_for, in_year, load_for, memory_left, read_scene, refinement_settings
 from ..main_thread import on_main_thread
 from ..runtime import Handlers, JobData, call_off, call_soon, job, redraw
 from ..scene.ages import crown_kinds, plainly_aged
 from ..scene.camera import read_camera, timeline_moves, views_of
 from ..scene.crowns import crown_for
-from ..scene.field_sizes import stand_years
+from ..scene.fields import stand_years
 from ..scene.objects import has_contents, is_drop, taking_part
 from ..scene.plants import NoPlantsError, gone_species, read_asset_plants, read_plants
 from ..settings import season_of, years_of
