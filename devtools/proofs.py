@@ -8,23 +8,30 @@
 A test that comes with a mend has to fail without it. The commit's ``tests`` are laid over the code of its parent, in
 a worktree beside this one, and each test gets a line: ``fails``, as it should, or ``passes``. Commits that leave the
 product alone are left out: of these the tests pass before, too. Tests of a full Blender run where ``BLENDER`` is set.
+
+Some tests that pass are right to: they guard what was never wrong, or follow another name. ``proofs.json`` says of each
+what shows that there was no fault; it gets a line with that, ``guards``. One that fails there is told, too: its reason
+is wrong.
 """
 
 from __future__ import annotations
 
 import argparse
 import ast
+import json
 import os
 import subprocess
 import sys
 import tempfile
-from collections import defaultdict
+from collections import Counter, defaultdict
 from collections.abc import Iterator
 from pathlib import Path
 from xml.etree import ElementTree
 
 ROOT = Path(__file__).resolve().parent.parent
 FULL = ("tests/full/", "tests/window/")
+#: Commits, and of each the tests without a fault before it: what shows that.
+GUARDS = Path(__file__).with_suffix(".json")
 NOT_CODE = (":!tests", ":!docs", ":!*.md", ":!.ci", ":!Makefile", ":!pyproject.toml")
 
 
@@ -105,17 +112,36 @@ def proofs(root: Path, base: str) -> Iterator[tuple[str, str, str]]:
                 _git(root, "worktree", "remove", "--force", str(tree))
 
 
+def judged(outcome: str, reason: str) -> tuple[bool, str]:
+    """Whether a test ends on the commit before its own as it should, and what to say of it.
+
+    Parameters
+    ----------
+    outcome : str
+        How it ends.
+    reason : str
+        Why it is right to pass; empty where nobody has said so.
+    """
+    if not reason:
+        return outcome.startswith("fails"), outcome
+    return (
+        outcome == "passes",
+        f"guards ({reason})" if outcome == "passes" else f"{outcome}, though it is said to guard",
+    )
+
+
 def main() -> int:
-    """Print a line for each test; 1 if any does not fail."""
+    """Print a line for each test; 1 if any does not end as it should."""
     parser = argparse.ArgumentParser(prog="python -m devtools.proofs", description=__doc__.splitlines()[0])
     parser.add_argument("base", nargs="?", help="the commits after this one (default: the last tag)")
-    failing = total = 0
+    guards = json.loads(GUARDS.read_text(encoding="utf-8"))
+    counted: Counter[str] = Counter()
     for commit, name, outcome in proofs(ROOT, parser.parse_args().base or last_tag(ROOT)):
-        print(f"{commit[:9]}  {outcome:6}  {name}", flush=True)
-        total += 1
-        failing += outcome.startswith("fails")
-    print(f"{failing} of {total} tests fail on the commit before theirs")
-    return int(failing < total)
+        right, text = judged(outcome, guards.get(commit[:8], {}).get(name, ""))
+        print(f"{commit[:9]}  {text:6}  {name}", flush=True)
+        counted[text.split()[0] if right else "wrong"] += 1
+    print(f"{counted['fails']} of {counted.total()} tests fail on the commit before theirs, {counted['guards']} guard")
+    return int(counted["wrong"] > 0)
 
 
 if __name__ == "__main__":

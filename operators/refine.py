@@ -58,7 +58,8 @@ class TETFLORA_OT_refine(ModalJob, bpy.types.Operator):
             try:
                 statistics = yield from job
                 auto.note_results(scene, made_for)
-                learn(expected, sum(statistics.seconds.values()))
+                # At first crowns may not have been known.
+                learn(expected or forecast(scene, context.view_layer), sum(statistics.seconds.values()))
                 return statistics
             except BaseException:
                 job.close()

@@ -33,10 +33,11 @@ class TETFLORA_UL_layers(bpy.types.UIList):
 
     def draw_item(self, _context, layout, _data, item, _icon, _active_data, _active_property, _index, _flag) -> None:
         row, kind = layout.row(align=True), kind_of(item)
+        row.use_property_split = False  # which would indent names
         if kind is GROUP:
             row.prop(item, "folded", text="", emboss=False, icon='RIGHTARROW' if item.folded else 'DOWNARROW_HLT')
         elif item.biome:
-            row.separator(factor=2.0)
+            row.separator()
         named = item.field if item.kind == FIELD and item.field is not None else item
         handle = row.row()
         handle.scale_x = 0.6
@@ -44,8 +45,9 @@ class TETFLORA_UL_layers(bpy.types.UIList):
         row.prop(named, "name", text="", emboss=False, icon=kind.icon)
         right = row.row(align=True)
         right.alignment = 'RIGHT'
-        right.label(text=_short(plants_in(item)), icon='FILE_REFRESH' if is_due(item) else 'NONE')
-        if item.frozen:  # few layers are, and names need the room
+        due = is_due(item)  # then the number is about to change, and names need the room
+        right.label(text="" if due else _short(plants_in(item)), icon='FILE_REFRESH' if due else 'NONE')
+        if item.frozen:
             right.prop(item, "frozen", text="", emboss=False, icon='FREEZE')
         right.prop(item, "shown", text="", emboss=False, icon='HIDE_OFF' if item.shown else 'HIDE_ON')
 

@@ -74,3 +74,10 @@ def test_without_a_tag_it_is_the_last_commit(repository: Path) -> None:
     assert proofs.last_tag(repository) == "HEAD~1"
     subprocess.run(("git", "tag", "1.0"), cwd=repository, check=True)
     assert proofs.last_tag(repository) == "1.0"
+
+
+def test_a_guard_is_told_with_its_reason_and_must_pass() -> None:
+    assert proofs.judged("fails", "") == (True, "fails")
+    assert proofs.judged("passes", "") == (False, "passes")
+    assert proofs.judged("passes", "a name") == (True, "guards (a name)")
+    assert not proofs.judged("fails", "a name")[0]

@@ -13,8 +13,10 @@ it is drawn. In each part of the image they lie one behind the other: as many as
 behind them or out of view few facets are made. So numbers follow from the rules of drawing and the budget, with their
 own constants; only how many layers fill a pixel is measured.
 
-Seconds are fitted to the cases of ``python -m benchmarks forest``, at 1920 × 1080 on two cores, whenever refinement
-changes, and those of what is expanded to plants of three species. Other machines differ by their speed.
+Seconds follow from the pixels that are tested and the branches that are opened, beside which leaves cost little. They
+are fitted to the processor's seconds of the scenes of ``python -m benchmarks estimates``, all together to birches at
+1920 × 1080 on two cores, whenever refinement changes; those of what is expanded to plants of three species. Other
+machines differ by their speed.
 
 The leaves and the wood that are near a camera are far finer: a spruce three meters away has a hundred times as many
 polygons as the same one from afar. Branches are few beside the polygons on them, so where all is expanded the nearest
@@ -168,12 +170,12 @@ def _large(result: Refinement) -> Floats:
     return np.bincount(held.cell[large], minlength=len(result.tree))[result.nodes].astype(np.float64)
 
 
-#: Seconds of any refinement, of each plant, and of each polygon or facet that is seen, and that nobody sees: of these
-#: there are few for what is opened.
-SECONDS = 1.5
+#: Seconds of any refinement, of each plant, of each covered pixel, and of each branch that is seen and its primitives.
+SECONDS = 0.6
 SECONDS_PER_PLANT = 2.5e-5
-SECONDS_PER_PRIMITIVE = np.array([3e-6, 1.2e-5])
-#: Seconds of each polygon that is expanded, and of each triangle that these consist of.
+SECONDS_PER_PIXEL = 2.7e-5
+SECONDS_PER_BRANCH = np.array([3.3e-6, 2.4e-5])
+#: Seconds of each polygon, and of each triangle of those that are expanded.
 SECONDS_EXPANDED = np.array([5e-7, 1.2e-7])
 #: Bytes of each plant.
 BYTES_PER_PLANT = 500.0
@@ -301,10 +303,10 @@ def estimate(
         made = whole @ parts.number
         memory += BYTES_PER_TRIANGLE * float(made[1])
         return Estimate(plants, float(made[0]), seconds + float(SECONDS_EXPANDED @ made), memory, False)
-    each = _numbers(stand, camera, settings, parts, plant, extent, whole[0])
-    wanted = float(each.sum())
+    wanted, covered, branches = _numbers(stand, camera, settings, parts, plant, extent, whole[0])
     made = min(wanted, settings.max_polygons or np.inf, allowed / BYTES_PER_POLYGON)
-    seconds += float(SECONDS_PER_PRIMITIVE @ each) * made / max(wanted, 1.0)
+    opened = float(SECONDS_PER_BRANCH @ branches) * made / max(wanted, 1.0)
+    seconds += SECONDS_PER_PIXEL * covered + opened + float(SECONDS_EXPANDED[0]) * made
     memory += BYTES_PER_POLYGON * made
     return Estimate(plants, made, seconds, memory, wanted > made)
 
@@ -317,8 +319,8 @@ def _numbers(
     plant: Integers,
     extent: Floats,
     whole: Floats,
-) -> Floats:
-    """Polygons and facets without limits that are seen, and that nobody sees (2,).
+) -> tuple[float, float, Floats]:
+    """Polygons and facets without limits, covered pixels, and the branches that are seen with their primitives (2,).
 
     ``whole`` (n,) is `_polygons` of parts, ``extent`` (n,) meters of a pixel.
     """
@@ -346,7 +348,8 @@ def _numbers(
     tubes = explicit_fraction(wide, TUBES)
     bows = np.clip(np.sqrt(_BEND * parts.length / (BENT * extent)), 1.0, np.maximum(parts.segments, 1))
     branch = tubes * tube + (1.0 - tubes) * bows * np.clip(area / (TWIG * facet), 0.0, 1.0)
-    seen = float((drawn * parts.number) @ np.where(wood, branch, leaf))
+    drawn_number = drawn * parts.number
+    seen = float(drawn_number @ np.where(wood, branch, leaf))
     # Areas without bounds are no number of facets.
     thrown = shadows.number / np.fmax((coarser * shadow) ** 2 / np.maximum(shadows.area, 1e-300), LIT_LEAVES)
     few = max(OUTSIDE_A_PIXEL * pixels, NEVER_TOO_MANY) / coarser**2
@@ -359,7 +362,7 @@ def _numbers(
         (leaves[~beside].sum(), OUTSIDE_A_PIXEL),
     ):
         unseen += min(float(number), max(a_pixel * pixels, NEVER_TOO_MANY) / coarser**2)
-    return np.array([seen, unseen])
+    return seen + unseen, covered, drawn_number[wood] @ np.stack([np.ones(int(wood.sum())), branch[wood]], axis=1)
 
 
 def _inside(parts: CrownParts, camera: Camera, extent: Floats) -> Mask:

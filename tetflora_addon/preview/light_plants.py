@@ -38,6 +38,8 @@ _BARE = 0.45
 _SUN, _SHADE = np.array([-0.45, -0.35, 0.82]), 0.45
 #: Radius of a trunk over its length, at least; plants of a species that its looks are taken from.
 _THIN, _SOME = 0.012, 64
+#: From so far out of the upright on, what a plant is does not stand but lies, as fallen branches do; radians.
+_LYING = 0.25 * np.pi
 _known: WeakKeyDictionary[Flora, Floats] = WeakKeyDictionary()
 _ANGLE = np.arange(SIDES) * 2.0 * np.pi / SIDES
 _AROUND = np.stack([np.cos(_ANGLE), np.sin(_ANGLE), 0 * _ANGLE], axis=1)
@@ -160,7 +162,8 @@ def _crowns(
 
 def crowns_of(flora: Flora, seeds: Seeds) -> Shapes:
     """All plants as points, as `light_plants` makes many."""
-    origin, rows = origin_near(seeds.position), flora.rows
+    # Some tell where most are, as well as all.
+    origin, rows = origin_near(seeds.position[:: max(len(seeds) // MOST_FACES, 1)]), flora.rows
     if seeds.crown is None:
         row, _, length = trunk_lengths(rows, seeds)
         forms = _profiles(flora).astype(np.float32)[rows["species"][row]] * length.astype(np.float32)[:, None]
@@ -169,9 +172,14 @@ def crowns_of(flora: Flora, seeds: Seeds) -> Shapes:
         low, high, *radii = _profiles(flora)[rows["species"][trunk.row]].T
         length, low, wider, _ = outlines(flora, trunk, low, high)
         forms = np.column_stack([low, high, *(wider * radius for radius in radii)]) * length[:, None]
+    axes = seeds.frame[:, :, 2].astype(np.float32)
+    lies = rows["angle"][flora.first_row, 0] > _LYING
+    if lies.any():
+        lying = np.flatnonzero(lies[seeds.species])
+        axes[lying] = trunks(rows, seeds.take(lying)).frame[:, :, 2]
     crowns = CrownPoints(
         (seeds.position - origin).astype(np.float32),
-        seeds.frame[:, :, 2].astype(np.float32),
+        axes,
         forms.astype(np.float32, copy=False),
         seeds.species,
         _looks_of_kinds(flora, _some_of_each(seeds)),
@@ -269,19 +277,30 @@ def _profiles(flora: Flora) -> Floats:
     """Of each species (s, 4): lowest and highest leaves, and radii of its crown's rings, for a trunk of length 1."""
     summer = flora.in_leaf
     if summer not in _known:
-        _known[summer] = np.stack([_profile(flora, int(row)) for row in flora.first_row])
+        found, number = np.stack([_profile(flora, int(row)) for row in flora.first_row]), len(flora.first_row)
+        alike = np.zeros(number, np.int64), np.zeros((number, 3)), np.tile(np.eye(3), (number, 1, 1)), np.ones(number)
+        plants = trunks(summer.rows, Seeds(("",) * number, np.arange(number, dtype=np.int32), *alike))
+        # Of what is turned all ways, a half of leaves and a π-th of the surface of wood shows.
+        area = 0.5 * summer.leaf_areas(plants) + summer.wood_areas(plants) / np.pi
+        # What is seen through covers as much as it does, and is narrower for that.
+        found[:, 2:] *= -np.expm1(-area / np.maximum(_from_the_side(found) * plants.length**2, 1e-9))[:, None]
+        _known[summer] = found
     return _known[summer]
+
+
+def _from_the_side(profiles: Floats) -> Floats:
+    """Areas (s,) of crowns of profiles (s, 4): a cone below the rings, one above, the mean of both between them."""
+    low, high, *radii = profiles.T
+    return (high - low) * sum(radii) * 0.5 * (1.0 + _RINGS[1] - _RINGS[0])
 
 
 def crown_areas(flora: Flora) -> Floats:
     """Areas (s,) of the crowns of species from the side, of mean length and on the flora's day, m²."""
-    low, high, *radii = _profiles(flora).T
-    length = flora.rows["length"][flora.first_row, 0]
-    if flora.day is not None:
-        left = [np.mean(flora.day.share_range(flora.rows, number)) for number in range(len(length))]
-        radii = (_BARE + (1.0 - _BARE) * np.minimum(left, 1.0)) * radii
-    # A cone below the rings and one above, and between them what is as wide as both on average.
-    return (high - low) * sum(radii) * 0.5 * (1.0 + _RINGS[1] - _RINGS[0]) * length**2
+    area = _from_the_side(_profiles(flora)) * flora.rows["length"][flora.first_row, 0] ** 2
+    if flora.day is None:
+        return area
+    left = [np.mean(flora.day.share_range(flora.rows, number)) for number in range(len(area))]
+    return (_BARE + (1.0 - _BARE) * np.minimum(left, 1.0)) * area
 
 
 def _profile(flora: Flora, row: int) -> Floats:
@@ -320,12 +339,6 @@ def _repeated(indices: Integers, corners: int, times: int) -> Integers32:
     return every.reshape(-1, indices.shape[1]).astype(np.int32)
 
 
-_SIDES = 6
-_WIDEST = 0.4  # fraction of the crown's height at which it is widest
-_SHADES = 0.5, 1.0  # of the lowest and the highest corner, by height
-_TRUNK = 0.03  # radius of the trunk over that of the crown
-
-
 def simple_crowns(
     matrices: Floats, size: tuple[float, float, float], color: Sequence[float], boxes: bool = False
 ) -> Shapes:
@@ -342,20 +355,21 @@ def simple_crowns(
     boxes : bool
         Edges of boxes instead of faces.
     """
-    corners, indices = _box(*size) if boxes else _crown(*size)
     of, origin = len(matrices), origin_near(matrices[:, :3, 3])
     shown = matrices[:: max(-(-of // MOST_PLANTS), 1)]
-    positions = corners @ shown[:, :3, :3].transpose(0, 2, 1) + (shown[:, None, :3, 3] - origin)
-    shade = np.interp(corners[:, 2], [0.0, size[2]], _SHADES)
-    colors = as_shown(np.clip(np.asarray(color) * shade[:, None], 0.0, 1.0))
-    return Shapes(
-        positions.reshape(-1, 3).astype(np.float32),
-        np.tile(colors, (len(shown), 1)).astype(np.float32),
-        _repeated(indices, len(corners), len(shown)),
-        len(shown),
-        of,
-        origin,
-    )
+    feet, frame, leaves = shown[:, :3, 3] - origin, shown[:, :3, :3], np.tile(color, (len(shown), 1))
+    if boxes:
+        corners, indices = _box(*size)
+        positions = (corners @ frame.transpose(0, 2, 1) + feet[:, None]).reshape(-1, 3).astype(np.float32)
+        colors = np.repeat(as_shown(leaves), len(corners), axis=0)
+    else:
+        radius, base, top = np.full((3, len(shown)), np.array(size)[:, None])
+        heights, widths = np.column_stack([base, top]), np.column_stack([radius, radius])
+        # What bears the crown is not known; it is in its shade.
+        positions, colors = _crowns(feet, frame, heights, widths, _THIN * top, leaves, _SHADE * leaves)
+        indices = _faces()
+    indices = _repeated(indices, len(positions) // max(len(shown), 1), len(shown))
+    return Shapes(positions, colors, indices, len(shown), of, origin)
 
 
 def joined(parts: Sequence[Shapes]) -> Shapes:
@@ -382,21 +396,6 @@ def joined(parts: Sequence[Shapes]) -> Shapes:
         origin,
         crowns,
     )
-
-
-def _crown(radius: float, base: float, top: float) -> tuple[Floats, Integers]:
-    """Corners (v, 3) and triangles (t, 3): a crown from its lowest corner over a ring to its highest, and a trunk."""
-    angle = np.arange(_SIDES) * 2.0 * np.pi / _SIDES
-    ring = np.stack([radius * np.cos(angle), radius * np.sin(angle), 0 * angle + base + _WIDEST * (top - base)], axis=1)
-    foot = np.array([[-1.0, -0.6, 0.0], [1.0, -0.6, 0.0], [0.0, 1.0, 0.0]]) * _TRUNK * radius
-    corners = np.concatenate([[[0.0, 0.0, base], [0.0, 0.0, top]], ring, foot])
-    i = np.arange(_SIDES)
-    j = (i + 1) % _SIDES
-    middle, trunk = 1, 2 + _SIDES
-    lower = np.stack([0 * i, 2 + j, 2 + i], axis=1)
-    upper = np.stack([2 + i, 2 + j, 0 * i + 1], axis=1)
-    stem = np.array([(trunk, trunk + 1, middle), (trunk + 1, trunk + 2, middle), (trunk + 2, trunk, middle)])
-    return corners, np.concatenate([lower, upper, stem])
 
 
 def _box(radius: float, base: float, top: float) -> tuple[Floats, Integers]:

@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import re
+import sys
 
 import bpy
 import pytest
@@ -58,6 +59,23 @@ def test_the_last_run_teaches_the_next_estimate():
     assert forecast.seconds_text(60.0 * found.seconds) in forecast.forecast_text(*shown)
     forecast._on_load()
     assert forecast.seconds_text(found.seconds) in forecast.forecast_text(*shown)
+
+
+def test_a_run_teaches_though_crowns_were_not_known_when_it_began(monkeypatch):
+    add_camera()
+    add_plant(species="birch")
+    operator, unknown, taught = sys.modules[bpy.types.TETFLORA_OT_refine.__module__], [None], []
+    monkeypatch.setattr(operator, "forecast", lambda *given: unknown.pop() if unknown else forecast.forecast(*given))
+    monkeypatch.setattr(operator, "learn", lambda expected, _: taught.append(expected.plants))
+    bpy.ops.tetflora.refine()
+    assert taught == [1]
+
+
+def test_while_crowns_are_looked_for_a_text_says_so(monkeypatch):
+    add_camera()
+    add_plant(species="birch")
+    monkeypatch.setattr(forecast, "crown_to_draw", lambda *_, **__: None)
+    assert forecast._text_for(bpy.context.scene, bpy.context.view_layer) == "Estimating…"
 
 
 @pytest.mark.parametrize("as_field", ["EMPTIES", "FIELD"])

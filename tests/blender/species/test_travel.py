@@ -107,6 +107,7 @@ def test_appended_plants_bring_their_species_and_hand_them_on(library, tmp_path)
 
 def test_what_is_reverted_does_not_come_back(library):
     bring(library, link=False)
+    assert species_for(bpy.context.scene, "conifer").name == "Blue Conifer"
     revert_species("bush_litter")
     revert_species("conifer")
     assert "bush_litter" not in catalog()
@@ -126,6 +127,7 @@ def test_only_what_nobody_knows_is_left_out_and_named(library):
 
 def test_pages_that_are_no_species_are_passed_over(library):
     collection = bring(library, link=False)
+    assert {e.identifier for e in bpy.context.scene.tetflora.species_edits} == {"bush_litter", "conifer"}
     for text in ("{", "[]", json.dumps({"../x": "{}", "y": 3}), "\0"):
         collection["tetflora_pages"] = text
         assert {"y", "../x"}.isdisjoint(catalog())

@@ -10,7 +10,9 @@ import numpy as np
 import pytest
 
 from tests.engine import support
+from tetflora_addon.compiled.flora import compile_species
 from tetflora_addon.preview import light_plants
+from tetflora_addon.species.species import Range
 
 #: Species, and how far to the east.
 KINDS = ("birch", 0.0), ("bush", 40.0)
@@ -42,6 +44,29 @@ def test_points_have_the_form_and_color_of_the_crowns_with_faces() -> None:
     feet = (some.positions.reshape(5, -1, 3)[:, 10:14].mean(axis=1) + some.origin)[:, None] - seeds.position
     assert set(np.linalg.norm(feet, axis=2).argmin(axis=1)) == set(np.argsort(angle)[-5:])
     assert least == pytest.approx(np.sort(angle)[-5], rel=1e-4)
+
+
+def test_fallen_branches_lie_on_the_ground_among_very_many_plants() -> None:
+    """Their trunk lies, whatever the frame of the plant says, also where they are points and have faces near."""
+    upright = support.flora().species[support.SPECIES.index("bush")]
+    orders = (replace(upright.orders[0], angle=Range(88.5, 1.0)), *upright.orders[1:])
+    flora = compile_species([replace(upright, orders=orders)])
+    points = light_plants.light_plants(flora, support.plants(np.arange(30), 0, np.zeros((30, 3)), 1.0), most=10)
+    near, _ = light_plants.nearest(points, np.array([30.0, 0.0, 5.0]), 30)
+    length, top = points.crowns.forms[:, 1], near.positions.reshape(30, -1, 3)[:, 9]
+    assert (np.abs(top[:, 2]) < 0.1 * length).all()
+    np.testing.assert_allclose(np.linalg.norm(top, axis=1), np.sort(length)[::-1], rtol=1e-3)
+
+
+def test_what_is_seen_through_is_narrower_and_covers_as_much_as_it_does() -> None:
+    flora = support.flora()
+    for name, least, most in (("birch", 0.9, 1.0), ("flower", 0.4, 0.6)):  # with leaves of 6 and of 1.3 times its side
+        number = support.SPECIES.index(name)
+        whole = light_plants._profile(flora, int(flora.first_row[number]))
+        shown = light_plants._profiles(flora)[number]
+        assert np.array_equal(shown[:2], whole[:2])
+        assert (least < shown[2:] / whole[2:]).all()
+        assert (shown[2:] / whole[2:] < most).all()
 
 
 def test_points_of_two_kinds_are_joined_with_their_looks() -> None:

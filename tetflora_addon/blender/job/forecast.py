@@ -80,7 +80,7 @@ def learn(expected: Estimate | None, seconds: float) -> None:
 
 
 def forecast_text(scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer) -> str:
-    """``About 12 s, 4.1 M polygons, 2.5 GB``, and in a second line which limit holds; empty where nothing is known.
+    """``About 12 s, 4.1 M polygons, 2.5 GB``, and in a second line which limit holds; empty where nothing can be known.
 
     As it was found last.
     """
@@ -90,7 +90,8 @@ def forecast_text(scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer) -> st
 def _text_for(scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer) -> str:
     found = forecast(scene, view_layer)
     if found is None:
-        return ""
+        # Plants are there, and their crowns are being looked for.
+        return "" if _counted.stand is not None or scene.camera is None else "Estimating…"
     seconds = seconds_text(found.seconds * _learned)
     text = f"About {seconds}, {polygons_text(found.primitives)}, {found.memory / _GIGA:.1f} GB"
     if not found.limited:

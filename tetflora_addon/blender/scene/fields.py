@@ -38,6 +38,7 @@ AGE = "age"
 _INTEGERS = {'INT', 'INT8', 'BOOLEAN'}
 #: Seeds may also have 64 bits, as those of instances that have come back from a file.
 _SEEDS = {*_INTEGERS, 'INT32_2D'}
+_BLOCK = 4_096  # points whose rotations are found at a time, so that they stay in the cache
 #: Attributes of fields that TetFlora makes, with their types.
 FIELD_ATTRIBUTES = {"rotation": 'QUATERNION', "scale": 'FLOAT', "species": 'INT', "seed": 'INT'}
 Points = bpy.types.Mesh | bpy.types.PointCloud
@@ -195,8 +196,12 @@ def _rotations(obj: bpy.types.Object, points: Points, size: int) -> Floats:
     attribute = _attribute(obj, points, "rotation", {'QUATERNION', 'FLOAT_VECTOR'})
     if attribute is None:
         return np.repeat(np.eye(3)[:, :, None], size, axis=2)
-    values = np.ascontiguousarray(values_of(attribute).T, np.float64)
-    return _from_quaternions(values) if len(values) == 4 else _from_eulers(values)
+    values, out = values_of(attribute), np.empty((3, 3, size))
+    turned = _from_quaternions if values.shape[1] == 4 else _from_eulers
+    for first in range(0, size, _BLOCK):
+        some = slice(first, first + _BLOCK)
+        out[:, :, some] = turned(np.ascontiguousarray(values[some].T, np.float64))
+    return out
 
 
 def _scales(obj: bpy.types.Object, points: Points, size: int, least: int) -> Floats:
@@ -249,7 +254,9 @@ def placed_frames(world: Floats, rotation: Floats, scale: Floats) -> tuple[Float
     else:
         # Of a scale along axes a column each; a scale alone holds for all of them.
         linear, rotation, found = world, rotation * scale, None
-    turned = (linear @ rotation.reshape(3, -1)).reshape(places, 3, 3, size).transpose(0, 3, 1, 2).reshape(-1, 3, 3)
+    if not np.array_equal(linear, np.eye(3)[None]):  # most fields stand where the world begins
+        rotation = linear @ rotation.reshape(3, -1)
+    turned = rotation.reshape(places, 3, 3, size).transpose(0, 3, 1, 2).reshape(-1, 3, 3)
     if found is None:
         return frames_of(turned)
     return turned, found, np.isfinite(turned.sum(axis=(1, 2))) & np.isfinite(found)

@@ -17,7 +17,6 @@ import blf
 import bpy
 import gpu
 import numpy as np
-from mathutils import Matrix
 from numpy.typing import NDArray
 
 from ...arrays import Floats, Floats32
@@ -132,7 +131,9 @@ def _standing(crowns: CrownPoints) -> gpu.types.GPUVertBuf:
     layout.attr_add(id="form", comp_type='F32', len=4, fetch_mode='FLOAT')
     buffer = gpu.types.GPUVertBuf(layout, len(crowns.kinds))
     buffer.attr_fill("pos", np.ascontiguousarray(crowns.positions))
-    buffer.attr_fill("form", np.ascontiguousarray(crowns.forms))
+    forms = crowns.forms.copy()
+    forms[:, :2] *= np.abs(crowns.axes[:, 2:])  # what lies is not high
+    buffer.attr_fill("form", forms)
     return buffer
 
 
@@ -176,21 +177,12 @@ def _shader(
 
 
 def _draw_points(made: gpu.types.GPUBatch, origin: Floats, eye: Floats, least: float) -> None:
-    region, height = bpy.context.region_data, bpy.context.region.height
-    shader = _crown_shader()
-    with gpu.matrix.push_pop():
-        gpu.matrix.translate(origin.tolist())
-        shader.uniform_float("matrix", _to_clip())
-        down = abs(region.view_matrix[2][2])
-        shader.uniform_float("view", (0.5 * height * region.window_matrix[1][1], down, 0.0, 0.0))
-        shader.uniform_float("eye", (*(eye - origin).tolist(), least))
-        gpu.state.program_point_size_set(True)
-        made.draw(shader)
-        gpu.state.program_point_size_set(False)
-
-
-def _to_clip() -> Matrix:
-    return gpu.matrix.get_projection_matrix() @ gpu.matrix.get_model_view_matrix()
+    region, height, shader = bpy.context.region_data, bpy.context.region.height, _crown_shader()
+    shader.uniform_float("view", (0.5 * height * region.window_matrix[1][1], abs(region.view_matrix[2][2]), 0.0, 0.0))
+    shader.uniform_float("eye", (*(eye - origin).tolist(), least))
+    gpu.state.program_point_size_set(True)
+    _draw(made, origin, shader)
+    gpu.state.program_point_size_set(False)
 
 
 def pyramid(camera: Camera, far: float, color: tuple[float, float, float, float]) -> gpu.types.GPUBatch:
@@ -234,20 +226,15 @@ def _kept(preview: Preview, name: str, key: tuple, make: Callable[[], object]) -
     return preview.cache[name][1]
 
 
-def _draw(made: gpu.types.GPUBatch | None, origin: Floats) -> None:
-    """Draw what counts from a place (3,) in the world."""
-    if made is not None:
-        with gpu.matrix.push_pop():
-            gpu.matrix.translate(origin.tolist())
-            made.draw(gpu.shader.from_builtin('SMOOTH_COLOR'))
-
-
-def _draw_faces(made: gpu.types.GPUBatch, origin: Floats) -> None:
-    shader = _faces_shader()
+def _draw(made: gpu.types.GPUBatch | None, origin: Floats, shader: gpu.types.GPUShader | None = None) -> None:
+    """Draw what counts from a place (3,) in the world, by Blender's own shader or one of ours."""
+    if made is None:
+        return
     with gpu.matrix.push_pop():
         gpu.matrix.translate(origin.tolist())
-        shader.uniform_float("matrix", _to_clip())
-        made.draw(shader)
+        if shader is not None:
+            shader.uniform_float("matrix", gpu.matrix.get_projection_matrix() @ gpu.matrix.get_model_view_matrix())
+        made.draw(shader or gpu.shader.from_builtin('SMOOTH_COLOR'))
 
 
 def _draw_plants(preview: Preview) -> None:
@@ -263,8 +250,7 @@ def _draw_plants(preview: Preview) -> None:
     gpu.state.depth_mask_set(True)
     gpu.state.face_culling_set('BACK')  # crowns and trunks are closed
     for one in (made, near):
-        if one is not None:
-            _draw_faces(one, shapes.origin)
+        _draw(one, shapes.origin, _faces_shader())
     gpu.state.face_culling_set('NONE')
     if shapes.crowns is not None:
         dots = _kept(preview, "points", (preview.made,), lambda: points(preview))
