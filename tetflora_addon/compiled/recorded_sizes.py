@@ -102,12 +102,9 @@ def ages_of_heights(species: Species, ratio: Floats) -> Floats:
 def at_age(species: Species, years: float, dead: float = 0.0, crowded: bool = False) -> Species:
     """A species at an age, full-grown at 0; or so many years after it has died at that age; that of a dense stand."""
     if crowded:
-        free, years = species, years or ages_of(species).full
-        leafy = replace(species, stand_leaves=max(species.stand_leaves, _LEAFY))
-        dense = at_age(replace(with_habit(leafy, 1.0), habit=0.0), years, dead)
-        # Facets hide as much behind others as those of free plants with as many leaves, which were measured.
-        leafiness = 1.0 if dead > 0.0 else leafy.stand_leaves
-        return replace(dense, aged=(free, years if dense.aged is None else dense.aged[1]), leafiness=leafiness)
+        dense = at_age(of_dense_stand(species), years or ages_of(species).full, dead)
+        # Dead ones have no leaves; what was measured of free ones holds.
+        return replace(dense, aged=(species, dense.aged[1])) if dead > 0.0 else replace(dense, crowded=True)
     if dead <= 0.0:
         return with_age(species, years) if years > 0.0 else species
     ages = ages_of(species)
@@ -117,6 +114,18 @@ def at_age(species: Species, years: float, dead: float = 0.0, crowded: bool = Fa
     dying = replace(species, ages=replace(ages, lifespan=years / _DIES, decline=_DIES))
     # What was measured of dead plants of the species holds for those that died young.
     return replace(with_age(dying, years / _DIES + dead), aged=(species, ages.lifespan + dead))
+
+
+def crowds(species: Species) -> bool:
+    """Whether plants of a species may grow between neighbors: not herbs, stools, palms and plants of one axis."""
+    limbs = species.orders[1].length.mean if len(species.orders) > 1 else np.inf
+    return ecology_of(species).height >= _WOODY and limbs <= 1.0
+
+
+def of_dense_stand(species: Species) -> Species:
+    """A species as it grows between neighbors."""
+    leafy = replace(species, stand_leaves=max(species.stand_leaves, _LEAFY))
+    return replace(with_habit(leafy, 1.0), habit=0.0)
 
 
 def sized(
@@ -215,8 +224,7 @@ def _thick(species: Species, diameter: Floats) -> Mask:
 
 def _crowded(species: Species, sizes: Sizes, number: int) -> Mask:
     """Which plants (n,) grew between neighbors, by the crowns that they have at last."""
-    limbs = species.orders[1].length.mean if len(species.orders) > 1 else np.inf
-    if ecology_of(species).height < _WOODY or limbs > 1.0:  # herbs; stools, palms and plants of one axis
+    if not crowds(species):
         return np.zeros(len(sizes), bool)
     measure, life, chosen = measure_of(species), sizes, np.arange(len(sizes))
     if sizes.lives is not None:

@@ -33,6 +33,7 @@ import numpy as np
 from ..arrays import GOLDEN_TURN, Floats, Floats32, Integers, Mask, Table, spiral, spread
 from ..compiled.clumping import PlantElements, basis, elements_of, fingerprint
 from ..compiled.flora import Flora, compile_species
+from ..compiled.recorded_sizes import crowds, of_dense_stand
 from ..growth.foliage import are_solids
 from ..growth.growth import trunks
 from ..growth.hashing import mix
@@ -467,7 +468,9 @@ def _ray_numbers(column: Integers, row: Integers) -> Integers:
 SHARES = (1.0, 0.4, 0.1, 0.0)
 """Parts of their leaves that plants have, of which weights are measured."""
 #: Leaves over those of free plants up to which the inverse of weights goes on in a line.
-DENSEST = 2.0
+DENSEST = 4.0
+#: Power with which the limbs of narrow crowns are denser, as the crowns are; fitted to oaks of a grown stand.
+_IN_LIMBS = 0.75
 #: Ages of which weights are measured: fractions of the full one, of the lifespan, and years after death.
 _YOUNG, _OLD, _DEAD = (0.04, 0.1, 0.25, 0.5), (0.9, 0.995), (1.0, 8.0, 30.0)
 #: No plant has weights beyond, however few leaves it has.
@@ -480,32 +483,30 @@ Known = Callable[[Flora, int], Floats]
 def leaf_shares(flora: Flora, subplants: Branches) -> Floats | None:
     """Leaves (n,) of sub-plants over those with which they were measured, on their day; None where all have as many.
 
-    Those of a dense stand have fewer on each twig; in narrow crowns, seen as a whole, they lie the closer together.
+    In narrow crowns of a dense stand, seen as a whole, they lie the closer together.
     """
     share = None if subplants.year is None else flora.day.leaf_share(subplants)
-    leafiness = np.array([one.leafiness for one in flora.species])[flora.species_of(subplants.row)]
-    if not (leafiness < 1.0).any():
+    crowded = np.array([one.crowded for one in flora.species])[flora.species_of(subplants.row)]
+    if subplants.crown is None or not crowded.any():
         return share
-    if subplants.crown is not None:
-        rows, row, crown = flora.rows, subplants.row, subplants.crown.astype(np.float64)
-        denser = crown[:, LEAVES] / np.maximum(crown[:, WIDTH], 1e-3) ** 2
-        # What is more is half in twigs, half in leaves on each.
-        whole = (rows["order"][row] == 0) & ~rows["continues"][row]
-        leafiness = np.where(leafiness < 1.0, leafiness * np.where(whole, denser, np.sqrt(denser)), leafiness)
-    leafiness = np.minimum(leafiness, DENSEST)
+    rows, row, crown = flora.rows, subplants.row, subplants.crown.astype(np.float64)
+    denser = np.minimum(crown[:, LEAVES] / np.maximum(crown[:, WIDTH], 1e-3) ** 2, DENSEST)
+    # Of what is more, twigs that stand closer are a part, and leaves on each the rest.
+    whole = (rows["order"][row] == 0) & ~rows["continues"][row]
+    leafiness = np.where(crowded, np.where(whole, denser, denser**_IN_LIMBS), 1.0)
     return leafiness if share is None else share * leafiness
 
 
 def states_of(flora: Flora, number: int) -> tuple[int, ...]:
     """Indices of `SHARES` between which plants of a species are on the day of a flora; those in summer have all.
 
-    Those of a dense stand have fewer at all times.
+    Those of a dense stand may have more or fewer at all times.
     """
     low, high = (1.0, 1.0) if flora.day is None else flora.day.share_range(flora.rows, number)
-    low, shares = low * flora.species[number].leafiness, np.array(SHARES)
+    shares = np.array(SHARES)
     first = int(np.flatnonzero(shares >= min(high, 1.0) - 1e-9)[-1])
     last = int(np.flatnonzero(shares <= low + 1e-9)[0])
-    return tuple(range(first, last + 1))
+    return tuple(range(first, max(last, int(flora.species[number].crowded)) + 1))
 
 
 def variants(species: Species) -> Iterator[tuple[str, Flora]]:
@@ -514,9 +515,15 @@ def variants(species: Species) -> Iterator[tuple[str, Flora]]:
     shares = SHARES if species.year is not None else SHARES[:2]
     for share in shares:
         yield f"{species.identifier} {share:g}", _with_leaves(plain.species[0], share)
-    for years in ages_measured(species):
-        if years != 0.0:
-            yield f"{species.identifier} {years:g} years", _at_age(species, years)
+    every = [(species, "", ages_measured(species))]
+    if len(every[0][2]) > 1 and crowds(species):
+        dense, dies = of_dense_stand(species), ages_of(species).lifespan
+        yield from ((f"{species.identifier} dense {s:g}", _with_leaves(dense, s)) for s in SHARES[:2])
+        every.append((dense, " dense", [age for age in ages_measured(dense) if age < dies]))
+    for one, kind, ages in every:
+        for years in ages:
+            if years != 0.0:
+                yield f"{species.identifier}{kind} {years:g} years", _at_age(one, years)
 
 
 def ages_measured(species: Species) -> list[float]:

@@ -506,7 +506,7 @@ class Species:
     skeleton: Skeleton | None = None  # trunk and lower orders modeled by hand; only the orders above are grown
     #: (Species, float): of what, and at how many years, this is another age; see `ages.with_age`.
     aged: tuple[Self, float] | None = None
-    leafiness: float = 1.0  # leaves on a twig over those of `aged`, where it is that of a dense stand
+    crowded: bool = False  # of a dense stand: its leaves lie closer where its crown is narrower
     year: Year | None = None  # when leaves appear, turn and fall
     ages: Ages | None = None  # how it grows
     ecology: Ecology | None = None  # what it needs among others

@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 from tests.engine import support
 from tetflora_addon.camera.camera import Camera
 from tetflora_addon.compiled.flora import Flora, compile_species
+from tetflora_addon.compiled.recorded_sizes import at_age
 from tetflora_addon.emission.plants import expanded_blocks
 from tetflora_addon.growth.growth import trunks
 from tetflora_addon.jobs import run_to_end
@@ -20,7 +21,6 @@ from tetflora_addon.proxies.microsurfaces import CIRCUMRADIUS, piece_facets, sub
 from tetflora_addon.proxies.primitives import facet_mesh
 from tetflora_addon.refinement.contents import piece_totals, subplant_totals
 from tetflora_addon.refinement.rasterize import occluder_depth
-from tetflora_addon.species.ages import ages_of, with_habit
 from tetflora_addon.species.catalog import list_species, load_species
 from tetflora_addon.subplants.pieces import open_subplants
 
@@ -86,11 +86,8 @@ def test_opened_plants_of_other_seeds_are_as_opaque() -> None:
 
 @pytest.mark.parametrize("opened", [0, 1])
 def test_trees_of_a_dense_stand_are_as_opaque(opened: int) -> None:
-    """They have fewer leaves on each twig, so less hides; in a narrow crown their limbs hide each other the more."""
-    free = load_species("beech")
-    full = ages_of(free).full
-    dense = replace(with_habit(free, 1.0), habit=0.0, aged=(free, full), leafiness=free.stand_leaves)
-    flora = compile_species([dense])
+    """They have weights of their own; in a narrow crown their limbs hide each other the more."""
+    flora = compile_species([at_age(load_species("beech"), 0.0, crowded=True)])
     weights, real, facets = subject.facet_weights(flora), [], []
     for seed in (901, 905):
         seeds = replace(support.plants(seed), crown=np.array([[0.6, 0.5, 0.0, 0.0, 1.0, 0.7]]))
