@@ -103,8 +103,10 @@ def at_age(species: Species, years: float, dead: float = 0.0, crowded: bool = Fa
     """A species at an age, full-grown at 0; or so many years after it has died at that age; that of a dense stand."""
     if crowded:
         dense = at_age(of_dense_stand(species), years or ages_of(species).full, dead)
+        if dead <= 0.0:
+            return replace(dense, crowded=True)
         # Dead ones have no leaves; what was measured of free ones holds.
-        return replace(dense, aged=(species, dense.aged[1])) if dead > 0.0 else replace(dense, crowded=True)
+        return replace(dense, aged=dense.aged and (species, dense.aged[1]))
     if dead <= 0.0:
         return with_age(species, years) if years > 0.0 else species
     ages = ages_of(species)

@@ -15,6 +15,7 @@ from tetflora_addon.compiled.flora import Flora, compile_species
 from tetflora_addon.compiled.recorded_sizes import at_age
 from tetflora_addon.emission.plants import expanded_blocks
 from tetflora_addon.growth.growth import trunks
+from tetflora_addon.growth.seasons import Season
 from tetflora_addon.jobs import run_to_end
 from tetflora_addon.proxies import facet_weights as subject
 from tetflora_addon.proxies.microsurfaces import CIRCUMRADIUS, piece_facets, subplant_facets
@@ -112,6 +113,22 @@ def test_every_shipped_species_has_a_table() -> None:
     for identifier in list_species():
         for name, flora in subject.variants(load_species(identifier)):
             assert subject.digest(flora, 0) in subject.shipped(), name
+
+
+@pytest.mark.parametrize("day", [20.0, 200.0, 300.0])
+def test_trees_of_stands_have_tables_on_all_days(day: float) -> None:
+    species = [at_age(load_species(name), years, crowded=True) for name in ("oak", "spruce") for years in (0.0, 30.0)]
+    flora = compile_species(species).in_year(Season(day))
+    for number in range(len(species)):
+        for variant in subject.needed(flora, number):
+            assert subject.digest(*variant) in subject.shipped()
+
+
+def test_dead_trees_of_stands_are_species_at_all_ages() -> None:
+    """What has no ages of its own, such as palms, is as it was."""
+    for name in ("oak", "palm"):
+        for years in (0.0, 5.0, 40.0):
+            assert compile_species([at_age(load_species(name), years, 6.0, crowded=True)]).polygons.max() > 0.0
 
 
 @given(st.floats(0.05, 1.6), st.floats(1e-3, 1e6))

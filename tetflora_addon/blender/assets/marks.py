@@ -261,10 +261,20 @@ def use_as_species(
 ) -> TetFloraAssetSpecies:
     """Make an object or a collection a species of this file; one that is a species already is measured anew.
 
-    ``scene`` receives the entry. ``datablock`` is original, and may be linked from a library. ``variants``: each object
-    of the collection, and each collection within it, is a plant of its own, and not all together one. Where an empty is
-    given that shows a collection, the collection is one plant, and so are all such empties. Raises `SceneError`:
-    nothing of it has faces; the message names it.
+    Parameters
+    ----------
+    scene : bpy.types.Scene
+        Receives the entry.
+    datablock : bpy.types.Object or bpy.types.Collection
+        Original; may be linked from a library.
+    variants : bool
+        Each object of the collection, and each collection within it, is a plant of its own, and not all together one.
+        Where an empty is given that shows a collection, the collection is one plant, and so are all such empties.
+
+    Raises
+    ------
+    SceneError
+        Nothing of it has faces; the message names it.
     """
     if isinstance(datablock, bpy.types.Object) and datablock.type == 'EMPTY' and datablock.instance_collection:
         datablock, variants = datablock.instance_collection, False  # it shows all of it

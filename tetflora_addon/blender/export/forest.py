@@ -84,7 +84,18 @@ def variants_of(
     most_polygons: int,
     left: float = np.inf,
 ) -> Job[Shown]:
-    """Choose variants of all kinds, and make these; what would not fit into so many bytes is refused."""
+    """Choose variants of all kinds, and make these.
+
+    Parameters
+    ----------
+    left : float
+        Bytes that they may take.
+
+    Raises
+    ------
+    SceneError
+        They would not fit; the message says what to lower.
+    """
     variant, scale, faces = np.zeros(len(seeds), np.int32), np.ones(len(seeds)), np.zeros(2)
     made: list[tuple[str, tuple[PlantLevel, ...], float, PlantKind]] = []
     for number, kind in enumerate(kinds):

@@ -285,8 +285,15 @@ BUILDING_MARK = "tetflora_building"
 def outline_steps(order: Import, kind: str = "") -> Steps:
     """Make curves of the outlines in a file; yields progress. Closing the steps leaves all as it was.
 
-    ``kind`` is what all are taken for; empty to tell them by their keys. A file that is broken, or cannot lie in this
-    scene, is a `SceneError`.
+    Parameters
+    ----------
+    kind : str
+        What all are taken for; empty to tell them by their keys.
+
+    Raises
+    ------
+    SceneError
+        The file is broken, or cannot lie in this scene.
     """
     progress = Progress(0.0, f"Reading {order.path.name}")
     yield progress

@@ -329,18 +329,31 @@ def refine_steps(
 ) -> Job[Statistics]:
     """Refine a scene step by step.
 
-    Closing the generator, or an error, leaves the scene as it was. Earlier results are replaced at the end, but for
-    those ``beside``, of other view layers. Send True while it refines to go on to meshes with the current state; the
-    statistics are then not complete.
+    Closing the generator, or an error, leaves the scene as it was. Earlier results are replaced at the end. Send True
+    while it refines to go on to meshes with the current state; the statistics are then not complete.
 
-    The dependency graph is evaluated for the frame. ``for_render``: results get a collection of their own beside the
-    artist's, and are refined for the render region. ``camera`` and ``given``, from `read_scene`, take the place of the
-    scene's own. ``mark`` is a suffix of the names of results. ``first_look``: show a coarse result within a second or
-    so, while the job goes on, where somebody looks and it takes longer; that one replaces earlier results already, and
-    stays when the job is closed.
+    Parameters
+    ----------
+    depsgraph : bpy.types.Depsgraph
+        Evaluated for the frame.
+    for_render : bool
+        Results get a collection of their own beside the artist's, and are refined for the render region.
+    beside : sequence of bpy.types.Collection
+        Earlier results that stay: those of other view layers.
+    camera : Camera, optional
+        Instead of the scene's current one.
+    given : SceneContents, optional
+        From `read_scene` for the scene.
+    mark : str
+        Suffix of the names of results.
+    first_look : bool
+        Show a coarse result within a second or so, while the job goes on, where somebody looks and it takes longer.
+        That one replaces earlier results already, and stays when the job is closed.
 
-    Raises `TetFloraError`: no camera, nothing to refine, unknown species, unusable plants or meshes; the message says
-    which.
+    Raises
+    ------
+    TetFloraError
+        No camera, nothing to refine, unknown species, unusable plants or meshes; the message says which.
     """
     data = JobData("Refine", scene, depsgraph)
     if camera is None and scene.camera is not None:
