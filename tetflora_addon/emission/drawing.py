@@ -10,7 +10,7 @@ of which lies behind full pixels as a whole.
 
 import itertools
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -25,6 +25,7 @@ from ..proxies.facet_weights import FacetWeights
 from ..proxies.microsurfaces import CIRCUMRADIUS, STRETCH, Facets, pushed_outside_view
 from ..proxies.primitives import Primitive, Triangles, joined, triangle_corners
 from ..refinement.contents import polygon_totals
+from ..refinement.decisions import contributions
 from ..refinement.loop import Refinement
 from ..refinement.shared_parts import SharePoints
 from .asset_plan import PlacedClusters
@@ -69,8 +70,14 @@ _OUTSIDE_BATCH = 20_000
 _FULL, _SPARE = 0.85, 0.75
 #: Least part of that which counts as left: facets have seven times the side then.
 _LEAST_LEFT = 0.005
+#: Largest sides in a tile over those that it began with, from which on it is drawn again, with the mean of them from
+#: the beginning: too little was left of its polygons for what lies behind, which would be shards among fine leaves. It
+#: begins with sides that grow at least by this power of what is too much, and is drawn so often at most.
+UNEVEN, _AGAIN, _TRIES = 2.0, 0.2, 5
 #: Part of what a tile may have that is made between two depths, at most.
 _SLAB = 0.06
+#: Part of what tiles have on average that each has besides.
+_LEAST_SHARE = 0.1
 #: Part of all that may be drawn which plants out of view have.
 _UNSEEN = 0.05
 #: Draws of this module.
@@ -112,6 +119,8 @@ class Drawing:
     form: FacetConverter | None = None  # what becomes of facets where they are made; without, they stay what they are
     most: float = np.inf  # polygons and facets that there may be, should what is expected be wrong
     shadow: float = 0.0  # pixels down to which shadows of what is not seen are refined; 0 leaves them coarse
+    #: (columns,): pixels in each column of the image that the loop found covered.
+    covered: Floats = field(default_factory=lambda: np.zeros(0))
 
 
 def drawing(
@@ -146,7 +155,18 @@ def drawing(
         kinds.append(faces)
         parts.append(rows := FaceRows.of(polygons))
         occluders = np.concatenate([occluders, faces.triangles(rows, TILE / 2)])
-    return Drawing(kinds, parts, camera, facet, hidden, shadows, shade, occluders, form, most, shadow)
+    covered = _covered_columns(result, camera)
+    return Drawing(kinds, parts, camera, facet, hidden, shadows, shade, occluders, form, most, shadow, covered)
+
+
+def _covered_columns(result: Refinement, camera: Camera) -> Floats:
+    """Pixels (width,) in each column of the image that the loop found covered, by the middles of its tetrahedra."""
+    seen = np.flatnonzero(result.in_view[result.nodes])
+    covered = contributions(result.cells, result.transmittance)[seen]
+    middle = result.tree.vertices(result.nodes[seen]).mean(axis=1)
+    coverage = Coverage(camera, (0, 1))
+    column = np.clip(np.nan_to_num(coverage.project(middle)[0]), 0, coverage.width - 1).astype(np.int64)
+    return np.bincount(column, covered, coverage.width)
 
 
 def drawn_blocks(given: Drawing) -> Iterator[Block | Parts | Shown]:
@@ -199,11 +219,11 @@ def _tiles(
             some = kind.opened(kind.met(some.take(np.flatnonzero(wide)), frontier.shown))[0]
         inside.append([kind.ordered(type(some).concatenate(found.pop(0))) for _ in range(number)])
         outside.append(kind.ordered(type(some).concatenate(beyond)))
-    tiles, every = [], max(sum(map(len, itertools.chain(*inside))), 1)
+    tiles, covered = [], given.covered + _LEAST_SHARE * max(given.covered.mean(), 1.0)
     for tile, (first, end) in enumerate(itertools.pairwise(ends.tolist())):
         own = [of[tile] for of in inside]
         if any(map(len, own)):
-            tiles.append(((first, end), own, 0.5 * sum(map(len, own)) / every + 0.5 / number))
+            tiles.append(((first, end), own, float(covered[first:end].sum() / covered.sum())))
     return tiles, outside, frontier.shown
 
 
@@ -212,13 +232,19 @@ def _drawn_tile(
 ) -> list[Block | Parts | Shown]:
     """All that is drawn of one tile, or of parts that are out of view."""
     number, columns, parts, share = item
-    tile = _Tile(given, columns)
     if columns is None:
+        tile = _Tile(given, columns)
         # Parts out of view, a share of all of them.
         pools = list(map(tile.frontier.pool, tile.given.kinds, parts))
         tile._draw_outside(pools, share, _UNSEEN * share * tile.given.most)
         return tile.made(number)
-    tile.draw(parts, (columns[1] - columns[0]) / tile.coverage.width, share * given.most)
+    times = 1.0
+    for _ in range(_TRIES):
+        tile = _Tile(given, columns)
+        tile.draw(parts, (columns[1] - columns[0]) / tile.coverage.width, share * given.most, times)
+        if max(tile.uneven, tile.over) <= 1.0:
+            break
+        times = max(tile.coarser, times * max(tile.uneven, tile.over) ** _AGAIN)
     return tile.made(number)
 
 
@@ -232,6 +258,9 @@ class _Tile(Canvas):
         self._facets: dict[tuple[Whose, bool], list[Primitive]] = {}
         self._drawn = 0.0  # those of what is seen
         self._asked = 0.0  # polygons and facets that there would be with sides as they are asked for
+        #: Largest sides of what is seen over those that the tile began with, and what was made over what may be: 1 where
+        #: these are as they should be.
+        self.uneven = self.over = 0.0
 
     def made(self, number: int) -> list[Block | Parts | Shown]:
         """Meshes by kind, facets by whose they are, and what is drawn as it is; the tile lets go of each."""
@@ -240,22 +269,30 @@ class _Tile(Canvas):
             for what in sorted(self.meshes)
             if (whole := concatenate_buffers(self.meshes.pop(what))) is not None
         ]
-        coarser = float(np.sqrt(max(self._asked / max(self._drawn, 1.0), 1.0)))
         owners = sorted({one for one, _ in self._facets}, key=lambda one: (one[0] is None, one[0] or 0, one[1]))
         facets = []
         for whose in owners:
             there = [seen for seen in (True, False) if (whose, seen) in self._facets]
             own = tuple((joined(self._facets.pop((whose, seen))), seen) for seen in there)
-            facets.append(Parts(whose[0], own, whose[1], coarser))
+            facets.append(Parts(whose[0], own, whose[1], self.coarser))
         return [*blocks, *facets, *self.frontier.shown]
 
-    def draw(self, parts: Sequence[Arrays], share: float, most: float) -> None:
-        """All parts of a tile, a share of the image, with no more than so many polygons and facets."""
+    @property
+    def coarser(self) -> float:
+        """Sides of what is seen over those of the drawing, root mean square."""
+        return float(np.sqrt(max(self._asked / max(self._drawn, 1.0), 1.0)))
+
+    def draw(self, parts: Sequence[Arrays], share: float, most: float, larger: float = 1.0) -> None:
+        """All parts of a tile, a share of the image, with no more than so many polygons and facets.
+
+        Sides are so many times as large as those of the drawing from the beginning.
+        """
         given, frontier = self.given, self.frontier
         if len(given.occluders):
             self.add_shown(given.occluders)
         for slabs in frontier.slabs(parts, _SLAB * most):
-            times, before = self._coarser(most), self.number
+            self.uneven = max(self.uneven, self._coarser(most) / UNEVEN)
+            times, before = larger * self._coarser(most), self.number
             frontier.facet, frontier.kinds = times * given.facet, [kind.coarser(times) for kind in given.kinds]
             for number, (kind, slab) in enumerate(zip(frontier.kinds, slabs, strict=True)):
                 if self.number > _FULL * most:
@@ -270,6 +307,7 @@ class _Tile(Canvas):
         self._draw_hidden(list(map(Waiting.concatenate, frontier.hidden)), self._few(HIDDEN_A_PIXEL, share, most))
         # What is outside of a tile's own image was part of something inside: it lies near the border.
         self._draw_outside(list(map(Waiting.concatenate, frontier.outside)), share, most)
+        self.over = self.number / most
         self._leave_out(self.number - most)
 
     def _coarser(self, most: float) -> float:

@@ -280,13 +280,18 @@ def test_a_tile_that_never_fits_is_drawn_as_far_as_it_does() -> None:
     assert 0.5 * most < sum(b.buffers.polygons for b in blocks) + len(facets) <= most
 
 
-def test_what_is_drawn_last_is_coarser_where_more_is_needed_than_expected() -> None:
-    """A tile that needs half as much again as it has is drawn once, without holes."""
+@pytest.mark.parametrize("times", [1.5, 3.0])
+def test_a_tile_that_needs_more_than_it_has_is_evenly_coarser(times: float) -> None:
+    """What is drawn last is seen through gaps of what is before, and no shard among fine leaves; there are no holes."""
     flora, _, camera, result = wood()
-    most = number_of() / 1.5
+    blocks, facets, _ = drawn_wood()
+    most = (sum(block.buffers.polygons for block in blocks) + len(facets)) / times
     pictures = [support.drawn(flora, result, camera, 1.2, 0.6, most=limit) for limit in (np.inf, most)]
     whole, limited = (np.isfinite(coverage_of(*picture, camera).depth).mean() for picture in pictures)
     assert limited == pytest.approx(whole, rel=0.01)
+    _, facets, seen = pictures[1]
+    sides = pixels_of(facets, camera)[seen]
+    assert sides.max() < 1.2 * subject.UNEVEN * np.median(sides)
 
 
 def test_sides_that_are_told_are_those_that_are_drawn() -> None:
