@@ -258,8 +258,7 @@ class _Tile(Canvas):
         self._facets: dict[tuple[Whose, bool], list[Primitive]] = {}
         self._drawn = 0.0  # those of what is seen
         self._asked = 0.0  # polygons and facets that there would be with sides as they are asked for
-        #: Largest sides of what is seen over those that the tile began with, and what was made over what may be: 1 where
-        #: these are as they should be.
+        #: Largest sides of what is seen, in `UNEVEN` of those that the tile began with; what was made, in what may be.
         self.uneven = self.over = 0.0
 
     def made(self, number: int) -> list[Block | Parts | Shown]:
