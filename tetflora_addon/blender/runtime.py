@@ -23,6 +23,7 @@ from bpy.app.handlers import persistent
 
 from ..errors import SceneError, readable
 from ..processes import pool
+from .declare import once
 from .main_thread import in_main_thread, later, on_main_thread
 
 _Datablock = TypeVar("_Datablock", bound=bpy.types.ID)
@@ -150,6 +151,71 @@ class Outlook(Generic[_Result]):
         self._handlers.unregister()
         call_off(self._timer)
         self._found = {}
+
+
+class SceneSwitch:
+    """What a switch of the window shows of one scene, made anew a moment after each change.
+
+    It belongs to the session: the scene is known by its `session_uid`, and forgotten when a file is loaded.
+
+    Parameters
+    ----------
+    make : callable
+        Makes it; gets the scene, or None where it is off or gone.
+    clear : callable
+        Takes away what was made.
+    soon : float
+        Seconds from a change; as many as making it took where that is more, or a slider that is dragged would stand.
+    drawn : bool
+        Whether there is nothing to make where no window draws it.
+    """
+
+    def __init__(
+        self, make: Callable[[bpy.types.Scene | None], None], clear: Callable[[], None], soon: float, drawn: bool
+    ) -> None:
+        self._make, self._clear, self._soon, self._drawn, self._took = make, clear, soon, drawn, 0.0
+        self.scene: int | None = None
+        self.refresh = partial(self._refresh)  # one object, which Blender can find again
+
+    def shown_in(self, scene: bpy.types.Scene) -> bool:
+        """Whether it is switched on in a scene."""
+        return self.scene == scene.session_uid
+
+    def show(self, scene: bpy.types.Scene, on: bool) -> None:
+        """Switch it on or off for a scene."""
+        self._clear()
+        self.scene = scene.session_uid if on else None
+        self.schedule()
+
+    def schedule(self) -> None:
+        """Make it anew soon; many changes in a row are one."""
+        if self.scene is not None:
+            self.look()
+
+    def look(self) -> None:
+        """The same, or take it away where it is off."""
+        if not (self._drawn and bpy.app.background):
+            call_soon(self.refresh, max(self._soon, self._took))
+
+    def _refresh(self) -> None:
+        begin = time.perf_counter()
+        self._make(with_uid(bpy.data.scenes, self.scene))
+        self._took = time.perf_counter() - begin
+
+    def forget(self) -> None:
+        """Forget the scene, and what was made."""
+        self.scene = None
+        call_off(self.refresh)
+        self._clear()
+
+    def property(self, label: str, tooltip: str) -> Any:
+        """The switch, for the window manager."""
+        return once.boolean(
+            label,
+            tooltip,
+            get=lambda _: bpy.context.scene is not None and self.shown_in(bpy.context.scene),
+            set=lambda _, on: self.show(bpy.context.scene, on),
+        )
 
 
 def is_there(datablock: bpy.types.ID | None) -> bool:
