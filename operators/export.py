@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Export the plants of a scene to other programs."""
+"""Write files for others: the plants of a scene for other programs, and a report of a fault."""
 
 import bpy
 from bpy.props import StringProperty
@@ -8,9 +8,12 @@ from bpy_extras.io_utils import ExportHelper
 
 from ..tetflora_addon.blender.declare import once
 from ..tetflora_addon.blender.export import forest
+from ..tetflora_addon.blender.report import report_text
+from ..tetflora_addon.errors import TetFloraError
+from ..tetflora_addon.files import write_whole
 from ..tetflora_addon.jobs import Job
 from ..tetflora_addon.parameters import within
-from .base import FileJob, counted, in_object_mode
+from .base import FileJob, FileTool, counted, in_object_mode
 
 
 class TETFLORA_OT_export_forest(FileJob, bpy.types.Operator, ExportHelper):
@@ -61,3 +64,28 @@ class TETFLORA_OT_export_forest(FileJob, bpy.types.Operator, ExportHelper):
     def finish(self, context: bpy.types.Context, result: forest.Exported) -> set[str]:
         made = f"{counted(result.plants, 'plant')} as {counted(result.variants, 'variant')}"
         return self.done(f"{made} written to {result.path}, {result.megabytes:,.1f} MB")
+
+
+class TETFLORA_OT_write_report(FileTool, bpy.types.Operator, ExportHelper):
+    """Write versions, cores, memory, settings and the last error to a text file, to report a fault with.
+
+    Nothing of the scene is in it, and no names or folders.
+    """
+
+    bl_label = "Write Report"
+    bl_options = {'REGISTER'}
+
+    filename_ext = ".txt"
+    filter_glob: StringProperty(default="*.txt", options={'HIDDEN'})
+
+    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+        self.filepath = self.filepath or "tetflora_report.txt"
+        return super().invoke(context, event)
+
+    def run(self, context: bpy.types.Context) -> set[str]:
+        path = self.path
+        try:
+            write_whole(path, report_text(context.scene))
+        except OSError as error:
+            raise TetFloraError(f"Cannot write {path}: {error.strerror}. Choose another folder") from None
+        return self.done(f"Written to {path}; look through it before you send it")

@@ -6,18 +6,18 @@ import bpy
 
 from ..tetflora_addon.blender.job import render
 from ..tetflora_addon.blender.runtime import classes_in
-from . import base, help, layers, menus, outputs, places, plants, preferences, refine, season, species, tools
+from . import base, help, layers, menus, outputs, plants, preferences, refine, season, species, tools
 
 # In the order of registration, which is that of the panels in the tab: as an artist works, a panel after its parent.
-_MODULES = (base, refine, layers, plants, season, places, species, outputs, menus)
+_MODULES = (base, refine, layers, plants, season, species, outputs, menus)
 CLASSES = classes_in(_MODULES, bpy.types.Panel, bpy.types.Menu, bpy.types.UIList)
 
 #: Menus and popovers of Blender's, and what draws entries in them.
 _ADDED = (
     ("VIEW3D_PT_overlay_object", outputs.draw_in_overlays),
     ("VIEW3D_MT_add", menus.draw_in_add_menu),
-    ("TOPBAR_MT_file_import", places.draw_in_import_menu),
-    ("TOPBAR_MT_file_export", places.draw_in_export_menu),
+    ("TOPBAR_MT_file_import", menus.draw_in_import_menu),
+    ("TOPBAR_MT_file_export", menus.draw_in_export_menu),
     ("VIEW3D_MT_object", menus.draw_in_object_menu),
     ("OUTLINER_MT_object", menus.draw_in_outliner),
     ("OUTLINER_MT_collection", menus.draw_in_outliner),

@@ -15,7 +15,7 @@ from functools import partial, wraps
 from math import inf
 from pathlib import Path
 from textwrap import wrap
-from traceback import FrameSummary, extract_tb
+from traceback import extract_tb
 from typing import Any, Generic, TypeVar
 
 import bpy
@@ -371,12 +371,9 @@ def register() -> None:
 def remember(text: str, error: BaseException | None = None) -> None:
     """Keep the last error of the session for a report, and where it was; the error itself would keep all its data."""
     global _last
-    _last = text, [f"  {_place(frame)}" for frame in extract_tb(error.__traceback__)] if error is not None else []
-
-
-def _place(frame: FrameSummary) -> str:
-    """File, line and function of a call, without the folders of a user."""
-    return f"{'/'.join(Path(frame.filename).parts[-3:])}:{frame.lineno} in {frame.name}"
+    calls = [] if error is None else extract_tb(error.__traceback__)
+    # Without the folders of a user.
+    _last = text, [f"  {'/'.join(Path(one.filename).parts[-3:])}:{one.lineno} in {one.name}" for one in calls]
 
 
 def last_error() -> tuple[str, list[str]]:

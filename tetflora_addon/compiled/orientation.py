@@ -87,7 +87,9 @@ def _evaluated(coefficients: Floats, row: Integers, frame: Floats, outward: Floa
         for weight, node in zip(quadratic(outward[chosen]).T, nodes, strict=True):
             local[chosen] += weight[:, None] * _product(basis[chosen], node)
     trace = local[:, :3].sum(axis=1, keepdims=True)
-    return _turned(local / np.where(trace > 0, trace, 1), frame)
+    # R M Rᵀ of symmetric M, given by six numbers each.
+    moments = (local / np.where(trace > 0, trace, 1))[:, [0, 3, 4, 3, 1, 5, 4, 5, 2]].reshape(-1, 3, 3)
+    return frame @ moments @ frame.transpose(0, 2, 1)
 
 
 def _basis(sky: Floats) -> Floats:
@@ -115,12 +117,6 @@ def _product(a: Floats, b: Floats) -> Floats:
     whole = len(a) // _PIECE * _PIECE
     pieces = np.ascontiguousarray(a[:whole]).reshape(-1, _PIECE, a.shape[1]) @ b
     return np.concatenate([pieces.reshape(whole, b.shape[1]), a[whole:] @ b])
-
-
-def _turned(six: Floats, frame: Floats) -> Floats:
-    """R M Rᵀ (n, 3, 3) of symmetric M given by six numbers (n, 6)."""
-    full = six[:, [0, 3, 4, 3, 1, 5, 4, 5, 2]].reshape(-1, 3, 3)
-    return frame @ full @ frame.transpose(0, 2, 1)
 
 
 def _frames_along(axis: Floats) -> Floats:

@@ -57,7 +57,10 @@ def forecast(scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer) -> Estimat
     depsgraph = view_layer.depsgraph
     if depsgraph is None or scene.camera is None:
         return None
-    stand = _stand_of(scene, view_layer)
+    layer = scene.session_uid, view_layer.name
+    if _counted.stand is None or _counted.layer != layer or _counted.stale:
+        _counted.stand, _counted.layer, _counted.stale = _count(scene, view_layer), layer, False
+    stand = _counted.stand
     if stand is None or not len(stand.number):
         return None
     try:
@@ -120,13 +123,6 @@ def polygons_text(number: float) -> str:
     if number >= _MEGA:
         return f"{number / _MEGA:.2g} M polygons" if number < 10.0 * _MEGA else f"{number / _MEGA:,.0f} M polygons"
     return f"{float(f'{number:.2g}'):,.0f} polygons"
-
-
-def _stand_of(scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer) -> Stand | None:
-    layer = scene.session_uid, view_layer.name
-    if _counted.stand is None or _counted.layer != layer or _counted.stale:
-        _counted.stand, _counted.layer, _counted.stale = _count(scene, view_layer), layer, False
-    return _counted.stand
 
 
 def _count(scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer) -> Stand | None:

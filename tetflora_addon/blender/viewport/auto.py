@@ -240,7 +240,8 @@ def on_change(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
     settings = f"{choices(scene)}{camera_now(scene)}{leaf_objects(scene)}"
     other = _seen.get(scene.session_uid) != settings
     _seen[scene.session_uid] = settings
-    concerns = [update for update in depsgraph.updates if _concerns(update)]
+    changed = [one for one in depsgraph.updates if isinstance(one.id.original, _CHANGING)]
+    concerns = [one for one in changed if not is_ours(one.id.original)]
     at_it = _state.steps is not None and scene.session_uid == _state.scene
     # Objects that have neither moved nor another form nor other settings may have been hidden.
     flags = (
@@ -262,11 +263,6 @@ def on_frame(scene: bpy.types.Scene, _depsgraph: object = None) -> None:
     moves = wind_of(scene) is not None or season_of(scene) is not None or years_of(scene) > 0.0
     if moves or stand_years(scene):
         schedule(scene)
-
-
-def _concerns(update: bpy.types.DepsgraphUpdate) -> bool:
-    changed = update.id.original
-    return isinstance(changed, _CHANGING) and not is_ours(changed)
 
 
 def on_interruption(*_arguments: object) -> None:

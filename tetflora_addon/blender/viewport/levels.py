@@ -244,11 +244,6 @@ def _moved(depsgraph: bpy.types.Depsgraph) -> bool:
     return any(not (isinstance(one, bpy.types.Object) and one.type in {'CAMERA', 'LIGHT'}) for one in changed)
 
 
-def _faces_of(flora: Flora, seeds: Seeds) -> Shapes:
-    """Plants as those are that look largest among very many."""
-    return with_faces(crowns_of(flora, seeds))
-
-
 def follow(
     scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, preview: Preview, views: Sequence[NDArray[np.float64]]
 ) -> None:
@@ -268,7 +263,7 @@ def follow(
         if running.seen is None or not np.array_equal(running.views, views):
             running.seen, running.views = in_view(running.seeds, views), views
         seen, others = running.seen, running.others
-        make = light_plants if len(running.seeds) <= MOST_FACES else _faces_of
+        make = light_plants if len(running.seeds) <= MOST_FACES else lambda *some: with_faces(crowns_of(*some))
         parts = [*_grown(scene, depsgraph, make, seen.seeds, seen), *others]
     except TetFloraError:  # which is told when all are read
         return
