@@ -17,16 +17,13 @@ from ..tetflora_addon.blender.geodata.origin import EXISTING, MIDDLE, WHOLE, Imp
 from ..tetflora_addon.blender.geodata.terrain import PATTERN, outline_steps, terrain_steps
 from ..tetflora_addon.blender.species.catalog import NO_SPECIES, operator_items
 from ..tetflora_addon.errors import TetFloraError
-from ..tetflora_addon.geodata.inventories import IMPERIAL, METRIC
-from ..tetflora_addon.geodata.layers import ENDINGS
-from ..tetflora_addon.geodata.outlines import KINDS
-from ..tetflora_addon.geodata.projection import PLAIN
+from ..tetflora_addon.geodata import inventories, layers, outlines, projection
 from ..tetflora_addon.parameters import within
 from .add import mix_in, parse_weights
 from .base import FileJob, in_object_mode, select_only
 from .layers import selected_grounds
 
-_LAYERS, _FORESTS = (";".join(f"*{ending}" for ending in endings) for endings in (ENDINGS, USD_ENDINGS))
+_LAYERS, _FORESTS = (";".join(f"*{ending}" for ending in endings) for endings in (layers.ENDINGS, USD_ENDINGS))
 
 
 def _file(text: str) -> Path | None:
@@ -77,7 +74,7 @@ class _Importing(FileJob, ImportHelper):
 
     def order(self, context: bpy.types.Context, **others: Any) -> Import:
         """What is to be imported."""
-        epsg = PLAIN if self.plain else self.epsg
+        epsg = projection.PLAIN if self.plain else self.epsg
         selected, graph = tuple(selected_grounds(context)), context.evaluated_depsgraph_get()
         crop = {"crop": self.crop, "side": self.crop_size}
         return Import(context.scene, graph, self.path, epsg, self.new_origin, selected, **crop, **others)
@@ -151,8 +148,8 @@ class TETFLORA_OT_import_inventory(_Importing, bpy.types.Operator):
         "Units",
         "Units of columns that do not name theirs",
         (
-            (METRIC, "Metric", "Meters; trunks in centimeters, unless they are too thin for that"),
-            (IMPERIAL, "Imperial", "Feet; trunks in inches"),
+            (inventories.METRIC, "Metric", "Meters; trunks in centimeters, unless they are too thin for that"),
+            (inventories.IMPERIAL, "Imperial", "Feet; trunks in inches"),
         ),
     )
     unknown: once.choice(
@@ -255,7 +252,7 @@ class TETFLORA_OT_import_outlines(_Importing, bpy.types.Operator):
         "What all areas and lines of the file are",
         (
             ('KEYS', "Told by Their Keys", "What each says that it is, by the keys of OpenStreetMap or others"),
-            *((kind.upper(), kind, f"All are {kind.lower()}") for kind in KINDS),
+            *((kind.upper(), kind, f"All are {kind.lower()}") for kind in outlines.KINDS),
         ),
     )
 
