@@ -16,7 +16,7 @@ from math import inf
 from pathlib import Path
 from textwrap import wrap
 from traceback import extract_tb
-from typing import Any, Generic, TypeVar
+from typing import Any, Generic, NamedTuple, TypeVar
 
 import bpy
 from bpy.app.handlers import persistent
@@ -31,6 +31,34 @@ _Datablock = TypeVar("_Datablock", bound=bpy.types.ID)
 _LINE = 100
 #: Errors of the last render: a text for each frame that was rendered without its plants.
 failed_frames: list[str] = []
+
+
+class Part(NamedTuple):
+    """What is there while the add-on is enabled: modules and others have two such functions as well."""
+
+    register: Callable[[], object]
+    unregister: Callable[[], object]
+
+
+def in_order(*parts: Any, end: Callable[[], object] | None = None) -> Part:
+    """Parts that are registered in this order, and unregistered in the reverse one, after what ``end`` does."""
+
+    def register() -> None:
+        for part in parts:
+            part.register()
+
+    def unregister() -> None:
+        if end is not None:
+            end()
+        for part in reversed(parts):
+            part.unregister()
+
+    return Part(register, unregister)
+
+
+def listening(function: Callable[..., object], *listeners: Any) -> Part:
+    """Let a function be called by `Listeners`, or draw in menus of Blender's, which take functions alike."""
+    return in_order(*(Part(partial(one.append, function), partial(one.remove, function)) for one in listeners))
 
 
 class Handlers:
@@ -160,6 +188,8 @@ class SceneSwitch:
 
     Parameters
     ----------
+    name, label, tooltip : str
+        Of the switch, a property of the window manager.
     make : callable
         Makes it; gets the scene, or None where it is off or gone.
     clear : callable
@@ -171,9 +201,23 @@ class SceneSwitch:
     """
 
     def __init__(
-        self, make: Callable[[bpy.types.Scene | None], None], clear: Callable[[], None], soon: float, drawn: bool
+        self,
+        name: str,
+        label: str,
+        tooltip: str,
+        make: Callable[[bpy.types.Scene | None], None],
+        clear: Callable[[], None],
+        soon: float,
+        drawn: bool,
     ) -> None:
-        self._make, self._clear, self._soon, self._drawn, self._took = make, clear, soon, drawn, 0.0
+        self._about, self._make, self._clear, self._soon, self._drawn, self._took = (
+            (name, label, tooltip),
+            make,
+            clear,
+            soon,
+            drawn,
+            0.0,
+        )
         self.scene: int | None = None
         self.refresh = partial(self._refresh)  # one object, which Blender can find again
 
@@ -208,14 +252,20 @@ class SceneSwitch:
         call_off(self.refresh)
         self._clear()
 
-    def property(self, label: str, tooltip: str) -> Any:
-        """The switch, for the window manager."""
-        return once.boolean(
-            label,
-            tooltip,
+    def register(self) -> None:
+        """Add the switch."""
+        name, *texts = self._about
+        switch = once.boolean(
+            *texts,
             get=lambda _: bpy.context.scene is not None and self.shown_in(bpy.context.scene),
             set=lambda _, on: self.show(bpy.context.scene, on),
         )
+        setattr(bpy.types.WindowManager, name, switch)
+
+    def unregister(self) -> None:
+        """Take it away, and what it shows."""
+        delattr(bpy.types.WindowManager, self._about[0])
+        self.forget()
 
 
 def is_there(datablock: bpy.types.ID | None) -> bool:

@@ -22,7 +22,7 @@ from ...growth.seasons import PRESENT, expected_of
 from ...processes import pool
 from ...species.kinds import species_of
 from ..attributes import read, values_of
-from ..runtime import Handlers, Outlook
+from ..runtime import Handlers, Outlook, in_order
 from ..scene.ages import crown_kinds
 from ..scene.camera import read_camera
 from ..scene.crowns import crown_to_draw
@@ -255,13 +255,4 @@ _HANDLERS = Handlers(depsgraph_update_post=_on_change, undo_post=_on_change, red
 _outlook = Outlook(_text_for, old=2.0)
 
 
-def register() -> None:
-    """Count and forecast from now on."""
-    _HANDLERS.register()
-    _outlook.register()
-
-
-def unregister() -> None:
-    """Do so no more."""
-    _outlook.unregister()
-    _HANDLERS.unregister()
+register, unregister = in_order(_HANDLERS, _outlook)

@@ -28,7 +28,7 @@ from ..properties import auto_refine_switched
 from ..results.collection import has_results
 from ..results.leaf_objects import leaf_objects
 from ..results.output import PURPOSE, remove_collection, result_collections
-from ..runtime import GoneError, Handlers, call_off, call_soon, redraw, with_uid
+from ..runtime import GoneError, Handlers, call_off, call_soon, in_order, listening, redraw, with_uid
 from ..scene.camera import view_camera
 from ..scene.fields import stand_years
 from ..settings import season_of, wind_of, years_of
@@ -296,6 +296,7 @@ def after_undo(*_arguments: object) -> None:
 
 def on_load(*_arguments: object) -> None:
     """Another file: its results are none of ours."""
+    stop()
     _done.clear()
     _seen.clear()
     _state.message = _state.view = ""
@@ -314,17 +315,4 @@ _HANDLERS = Handlers(
     load_pre=(on_interruption, on_load),
     load_post=lambda *_: watch() and None,
 )
-
-
-def register() -> None:
-    """Listen."""
-    auto_refine_switched.append(_switched)
-    _HANDLERS.register()
-
-
-def unregister() -> None:
-    """Stop, and listen no more."""
-    stop()
-    on_load()
-    _HANDLERS.unregister()
-    auto_refine_switched.remove(_switched)
+register, unregister = in_order(listening(_switched, auto_refine_switched), _HANDLERS, end=on_load)

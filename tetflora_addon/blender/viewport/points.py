@@ -21,7 +21,7 @@ from .. import compat
 from ..placing import properties
 from ..placing.populations import own_objects
 from ..placing.rules import awaits_update, makes_field, read_search, shown_population
-from ..runtime import Handlers, SceneSwitch, redraw
+from ..runtime import Handlers, SceneSwitch, in_order, listening, redraw
 from ..species import edits
 
 Color = tuple[float, float, float, float]
@@ -164,32 +164,21 @@ def _clear() -> None:
     redraw()
 
 
-switch = SceneSwitch(_place, _clear, _SOON, drawn=True)
+switch = SceneSwitch(
+    "tetflora_points",
+    "Preview Points",
+    "Show a dot in the viewport for each plant that the active layer would place by its present settings, "
+    "colored by species, updated with every change. Creates no objects",
+    _place,
+    _clear,
+    _SOON,
+    drawn=True,
+)
 schedule = switch.schedule
 _HANDLERS = Handlers(
     undo_post=lambda *_: schedule(), redo_post=lambda *_: schedule(), load_pre=lambda *_: switch.forget()
 )
-
-
-def register() -> None:
-    """Listen to changes of populations and species, undo and loading."""
-    bpy.types.WindowManager.tetflora_points = switch.property(
-        "Preview Points",
-        "Show a dot in the viewport for each plant that the active layer would place by its present settings, "
-        "colored by species, updated with every change. Creates no objects",
-    )
-    properties.listeners.append(schedule)
-    edits.listeners.append(schedule)
-    _HANDLERS.register()
-
-
-def unregister() -> None:
-    """Take the dots and all that listens away."""
-    del bpy.types.WindowManager.tetflora_points
-    switch.forget()
-    _HANDLERS.unregister()
-    edits.listeners.remove(schedule)
-    properties.listeners.remove(schedule)
+register, unregister = in_order(switch, listening(schedule, properties.listeners, edits.listeners), _HANDLERS)
 
 
 class GroundCursor:

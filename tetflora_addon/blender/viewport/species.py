@@ -19,7 +19,7 @@ from ..job.contents import expected_polygons, in_year
 from ..job.plant_mesh import plant_mesh, plant_parts, single_seed
 from ..materials.nodes import is_ours, tag
 from ..results.leaf_objects import resolved_species
-from ..runtime import Handlers, SceneSwitch, redraw
+from ..runtime import Handlers, SceneSwitch, in_order, listening, redraw
 from ..species import edits
 from ..species.editor import present_species
 
@@ -122,7 +122,16 @@ def _on_undo(_scene: bpy.types.Scene, _other: object = None) -> None:
         switch.look()
 
 
-switch = SceneSwitch(_build, _remove, _SOON, drawn=False)
+switch = SceneSwitch(
+    "tetflora_species",
+    "Preview",
+    "Show one plant of the species in the editor at the 3D cursor, updated with every change. It is never "
+    "rendered or saved",
+    _build,
+    _remove,
+    _SOON,
+    drawn=False,
+)
 _HANDLERS = Handlers(
     undo_pre=_before_undo,
     redo_pre=_before_undo,
@@ -130,22 +139,4 @@ _HANDLERS = Handlers(
     redo_post=_on_undo,
     load_pre=lambda *_: switch.forget(),
 )
-
-
-def register() -> None:
-    """Listen to changes of species, undo and loading."""
-    bpy.types.WindowManager.tetflora_species = switch.property(
-        "Preview",
-        "Show one plant of the species in the editor at the 3D cursor, updated with every change. It is never "
-        "rendered or saved",
-    )
-    edits.listeners.append(switch.schedule)
-    _HANDLERS.register()
-
-
-def unregister() -> None:
-    """Take the preview and all that listens away."""
-    del bpy.types.WindowManager.tetflora_species
-    switch.forget()
-    _HANDLERS.unregister()
-    edits.listeners.remove(switch.schedule)
+register, unregister = in_order(switch, listening(switch.schedule, edits.listeners), _HANDLERS)
