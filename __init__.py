@@ -4,18 +4,7 @@
 
 from . import operators, panels
 from .tetflora_addon import blender
+from .tetflora_addon.blender.runtime import in_order
 
-# Properties first: operators and panels refer to them.
-_PARTS = (blender, operators, panels)
-
-
-def register() -> None:
-    """Make TetFlora known to Blender; an error in any part goes through to the user."""
-    for part in _PARTS:
-        part.register()
-
-
-def unregister() -> None:
-    """Take everything back in reverse order."""
-    for part in reversed(_PARTS):
-        part.unregister()
+# Properties first: operators and panels refer to them. An error in any part goes through to the user.
+register, unregister = in_order(blender, operators, panels)

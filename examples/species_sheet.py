@@ -21,7 +21,6 @@ from tetflora_addon.proxies import microsurfaces
 from tetflora_addon.proxies.primitives import facet_mesh
 from tetflora_addon.species import catalog
 from tetflora_addon.subplants import leaf_meshes, tubes
-from tetflora_addon.subplants.pieces import open_branches
 
 from . import stage
 from .paper.pictures import save_sheet
@@ -67,7 +66,7 @@ def opened_cell(identifier: str, orders: int) -> Callable[[], tuple[np.ndarray, 
         closed = growth.trunks(flora.rows, single)
         parts = []
         for _ in range(orders):
-            whole, _, closed, _ = open_branches(flora, closed)
+            whole, _, closed, _ = growth.open_branches(flora.rows, closed)
             parts.append(("bark", 0, tubes.tube_buffers(flora, [whole])))
             parts += [("leaf", leaf.form, leaf.buffers) for leaf in leaf_meshes.leaf_meshes(flora, 0, [whole])]
         points = []

@@ -81,7 +81,9 @@ class TETFLORA_OT_use_as_skeleton(Reporting, bpy.types.Operator):
         plants = selected_plants(context)
         if not plants:
             scene, matrix = context.scene, world_matrix(form, depsgraph)
-            plants = add_plant(scene, matrix[:3, 3], upright_turn(matrix), 1.0, next_seed(scene), _species(scene))
+            shown = present_species(scene.tetflora.species_editor)
+            species = shown if shown in catalog() else default_species()
+            plants = add_plant(scene, matrix[:3, 3], upright_turn(matrix), 1.0, next_seed(scene), species)
         height = float(skeleton.points[:, 2].max())
         for plant in plants:
             plant.tetflora.skeleton = form
@@ -91,12 +93,6 @@ class TETFLORA_OT_use_as_skeleton(Reporting, bpy.types.Operator):
         select_only(context, plants)
         made = f"{counted(len(skeleton.points), 'point')} drawn"
         return self.done(f'"{form.name}" is now the skeleton of {counted(len(plants), "plant")}: {made}')
-
-
-def _species(scene: bpy.types.Scene) -> str:
-    """The species that the editor shows."""
-    present = present_species(scene.tetflora.species_editor)
-    return present if present in catalog() else default_species()
 
 
 class TETFLORA_OT_first_forest(Reporting, bpy.types.Operator):

@@ -1,24 +1,19 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Export the plants of a scene to other programs."""
+"""Write files for others: the plants of a scene for other programs, and a report of a fault."""
 
 import bpy
 from bpy.props import StringProperty
 from bpy_extras.io_utils import ExportHelper
 
 from ..tetflora_addon.blender.declare import once
-from ..tetflora_addon.blender.export.forest import (
-    FORMATS,
-    LEVELS,
-    MOST_VARIANTS,
-    WRITERS,
-    Exported,
-    ExportOrder,
-    export_steps,
-)
+from ..tetflora_addon.blender.export import forest
+from ..tetflora_addon.blender.report import report_text
+from ..tetflora_addon.errors import TetFloraError
+from ..tetflora_addon.files import write_whole
 from ..tetflora_addon.jobs import Job
 from ..tetflora_addon.parameters import within
-from .base import FileJob, counted, in_object_mode
+from .base import FileJob, FileTool, counted, in_object_mode
 
 
 class TETFLORA_OT_export_forest(FileJob, bpy.types.Operator, ExportHelper):
@@ -33,16 +28,18 @@ class TETFLORA_OT_export_forest(FileJob, bpy.types.Operator, ExportHelper):
     browse = ExportHelper.invoke
     cancelled = "Cancelled; nothing was written"
 
-    filter_glob: StringProperty(default=";".join(f"*{ending}" for ending in WRITERS), options={'HIDDEN'})
-    format: once.choice("Format", "What the file is for, if its name has no ending", FORMATS)
+    filter_glob: StringProperty(default=";".join(f"*{ending}" for ending in forest.WRITERS), options={'HIDDEN'})
+    format: once.choice("Format", "What the file is for, if its name has no ending", forest.FORMATS)
     variants: once.integer(
         "Variants",
         "Plants of each species that stand for all others. No two plants are alike where there are no more than that",
         8,
-        **within(1, 64, MOST_VARIANTS),
+        **within(1, 64, forest.MOST_VARIANTS),
     )
     levels: once.integer(
-        "Levels", "Levels of detail with the full plant; 0 for as many as suit each species", **within(0, high=LEVELS)
+        "Levels",
+        "Levels of detail with the full plant; 0 for as many as suit each species",
+        **within(0, high=forest.LEVELS),
     )
     polygons: once.integer(
         "Max Polygons",
@@ -59,11 +56,36 @@ class TETFLORA_OT_export_forest(FileJob, bpy.types.Operator, ExportHelper):
         """What is added to names without an ending."""
         return self.format
 
-    def steps(self, context: bpy.types.Context) -> Job[Exported]:
+    def steps(self, context: bpy.types.Context) -> Job[forest.Exported]:
         path = self.path if self.path.suffix else self.path.with_suffix(self.format)
-        order = ExportOrder(path, self.variants, self.levels, self.polygons, self.bake)
-        return export_steps(context.scene, context.evaluated_depsgraph_get(), order)
+        order = forest.ExportOrder(path, self.variants, self.levels, self.polygons, self.bake)
+        return forest.export_steps(context.scene, context.evaluated_depsgraph_get(), order)
 
-    def finish(self, context: bpy.types.Context, result: Exported) -> set[str]:
+    def finish(self, context: bpy.types.Context, result: forest.Exported) -> set[str]:
         made = f"{counted(result.plants, 'plant')} as {counted(result.variants, 'variant')}"
         return self.done(f"{made} written to {result.path}, {result.megabytes:,.1f} MB")
+
+
+class TETFLORA_OT_write_report(FileTool, bpy.types.Operator, ExportHelper):
+    """Write versions, cores, memory, settings and the last error to a text file, to report a fault with.
+
+    Nothing of the scene is in it, and no names or folders.
+    """
+
+    bl_label = "Write Report"
+    bl_options = {'REGISTER'}
+
+    filename_ext = ".txt"
+    filter_glob: StringProperty(default="*.txt", options={'HIDDEN'})
+
+    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+        self.filepath = self.filepath or "tetflora_report.txt"
+        return super().invoke(context, event)
+
+    def run(self, context: bpy.types.Context) -> set[str]:
+        path = self.path
+        try:
+            write_whole(path, report_text(context.scene))
+        except OSError as error:
+            raise TetFloraError(f"Cannot write {path}: {error.strerror}. Choose another folder") from None
+        return self.done(f"Written to {path}; look through it before you send it")

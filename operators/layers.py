@@ -10,51 +10,18 @@ import bpy
 from bpy.props import StringProperty
 from bpy_extras.io_utils import ImportHelper
 
-from ..tetflora_addon.blender.biomes.adding import (
-    BiomeResult,
-    add_biome_steps,
-    lay_biome_soil,
-    make_land,
-    plant_biome_steps,
-    remove_biome,
-)
+from ..tetflora_addon.blender.biomes import adding, layers
 from ..tetflora_addon.blender.biomes.files import active_biome, import_biome, read_biome, saved_populations
 from ..tetflora_addon.blender.biomes.files import save_biome as save_biome_file
-from ..tetflora_addon.blender.biomes.layers import (
-    active_layer,
-    children_of,
-    copy_layer,
-    due_layers,
-    forget_gone,
-    group_layer,
-    index_of,
-    move_layer,
-    order_of,
-    sort_layers,
-    ungroup_layer,
-)
 from ..tetflora_addon.blender.biomes.library import BIOMES, NO_BIOME, biomes
 from ..tetflora_addon.blender.declare import boolean, choice, once, string
-from ..tetflora_addon.blender.placing.cover import (
-    CoverResult,
-    cover_steps,
-    cover_with_snow,
-    covered_population,
-    strew_steps,
-)
+from ..tetflora_addon.blender.placing import cover
 from ..tetflora_addon.blender.placing.first_forest import is_startup
 from ..tetflora_addon.blender.placing.populations import PlacedPlants, make_plants_steps, remove_layer, reroll_steps
 from ..tetflora_addon.blender.placing.rules import active_population, grounds_of, set_grounds
 from ..tetflora_addon.blender.runtime import is_there
 from ..tetflora_addon.blender.settings import BIOME, FIELD, with_identity
-from ..tetflora_addon.blender.stands.growing import (
-    GrownStand,
-    again_steps,
-    animate,
-    is_stand,
-    keep_year,
-    new_stand_steps,
-)
+from ..tetflora_addon.blender.stands import growing
 from ..tetflora_addon.blender.viewport import points
 from ..tetflora_addon.errors import SceneError, TetFloraError
 from ..tetflora_addon.jobs import Job, Progress, part_of
@@ -68,7 +35,7 @@ def selected_grounds(context: bpy.types.Context) -> list[bpy.types.Object]:
 
 def grounds_to_plant(context: bpy.types.Context) -> list[bpy.types.Object]:
     """Selected meshes or, without any, the ground of the active layer: what one adds next grows there too."""
-    layer = active_layer(context.scene)
+    layer = layers.active_layer(context.scene)
     if (found := selected_grounds(context)) or layer is None:
         return found
     return grounds_of(context.scene, layer.field.tetflora.stand if layer.kind == FIELD and layer.field else layer)
@@ -76,7 +43,7 @@ def grounds_to_plant(context: bpy.types.Context) -> list[bpy.types.Object]:
 
 ground_selected = need(selected_grounds, "Select a mesh to plant on")
 ground_found = need(grounds_to_plant, "Select a mesh to plant on")
-layer_exists = need(lambda context: active_layer(context.scene), "Add a layer first")
+layer_exists = need(lambda context: layers.active_layer(context.scene), "Add a layer first")
 _ACTIVE = (in_object_mode, layer_exists)
 _ROW = 20.0  # pixels of a row of a list at a scale of 1
 
@@ -108,7 +75,7 @@ def tell_layers(
 
 
 #: What an update made: results of layers, why others have no plants, grounds that keep a material.
-Updated = tuple[list[PlacedPlants | GrownStand | int], list[str], list[str]]
+Updated = tuple[list[PlacedPlants | growing.GrownStand | int], list[str], list[str]]
 
 
 class TETFLORA_OT_update_layers(ModalJob, bpy.types.Operator):
@@ -152,12 +119,12 @@ class TETFLORA_OT_update_layers(ModalJob, bpy.types.Operator):
 
     def steps(self, context: bpy.types.Context) -> Job[Updated]:
         scene, depsgraph = context.scene, context.evaluated_depsgraph_get()
-        active, one = active_layer(scene), self.which == 'ACTIVE'
+        active, one = layers.active_layer(scene), self.which == 'ACTIVE'
         if one and active.kind == BIOME and not self.reroll:
-            added = yield from plant_biome_steps(scene, depsgraph, active)
+            added = yield from adding.plant_biome_steps(scene, depsgraph, active)
             return [number for _, number in added.layers], added.bare, added.kept
-        uids = [layer.uid for layer in (*children_of(active), active) if layer.kind != BIOME] if one else []
-        uids = uids if one else due_layers(scene)
+        uids = [layer.uid for layer in (*layers.children_of(active), active) if layer.kind != BIOME] if one else []
+        uids = uids if one else layers.due_layers(scene)
         if not uids:
             raise SceneError("All layers are up to date")
         return (yield from self._each(scene, depsgraph, uids))
@@ -181,20 +148,20 @@ class TETFLORA_OT_update_layers(ModalJob, bpy.types.Operator):
         kept = []
         for biome in filter(None, (with_identity(scene.tetflora.layers, uid) for uid in biomes)):
             depsgraph.update()
-            kept += lay_biome_soil(depsgraph, [e.object for e in biome.grounds if e.object is not None])
+            kept += adding.lay_biome_soil(depsgraph, [e.object for e in biome.grounds if e.object is not None])
         return made, bare, kept
 
     def _steps_of(
         self, scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, layer: bpy.types.PropertyGroup
-    ) -> Job[PlacedPlants | GrownStand]:
+    ) -> Job[PlacedPlants | growing.GrownStand]:
         if layer.kind == FIELD:
-            if not is_stand(layer.field):
+            if not growing.is_stand(layer.field):
                 raise SceneError(f'"{layer.name}" has no rules to grow again by; use the brush, or edit its points')
             if layer.frozen:
                 raise SceneError(f'"{layer.name}" is frozen and keeps its plants; turn off Freeze to change it')
             if self.reroll:
                 layer.field.tetflora.stand.seed += 1
-            return again_steps(scene, depsgraph, layer.field)
+            return growing.again_steps(scene, depsgraph, layer.field)
         if self.forget_erased:
             layer.erased = ""
         return (reroll_steps if self.reroll else make_plants_steps)(scene, depsgraph, layer)
@@ -234,9 +201,9 @@ class TETFLORA_OT_move_layer(Reporting, bpy.types.Operator):
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
         if self.direction != 'DRAG':
             return self.execute(context)
-        if (index := index_of(context.scene, self.layer)) >= 0:
+        if (index := layers.index_of(context.scene, self.layer)) >= 0:
             context.scene.tetflora.layers_index = index
-        self._before, self._at = order_of(context.scene), event.mouse_y
+        self._before, self._at = layers.order_of(context.scene), event.mouse_y
         context.window_manager.modal_handler_add(self)
         context.window.cursor_modal_set('MOVE_Y')
         return {'RUNNING_MODAL'}
@@ -246,23 +213,24 @@ class TETFLORA_OT_move_layer(Reporting, bpy.types.Operator):
         while abs(self._at - event.mouse_y) >= row:
             step = 1 if event.mouse_y < self._at else -1
             self._at -= step * row
-            move_layer(scene, step)
+            layers.move_layer(scene, step)
             context.area.tag_redraw()
         done = event.type in {'LEFTMOUSE', 'RET'} and event.value == 'PRESS'
         if not done and event.type not in {'ESC', 'RIGHTMOUSE'}:
             return {'RUNNING_MODAL'}
         context.window.cursor_modal_restore()
         if not done:
-            sort_layers(scene, self._before, active_layer(scene).uid)
+            layers.sort_layers(scene, self._before, layers.active_layer(scene).uid)
         points.schedule()
         return {'FINISHED' if done else 'CANCELLED'}
 
     def run(self, context: bpy.types.Context) -> set[str]:
         scene = context.scene
-        if self.direction in {'IN', 'OUT'} and not (group_layer if self.direction == 'IN' else ungroup_layer)(scene):
+        regroup = {'IN': layers.group_layer, 'OUT': layers.ungroup_layer}.get(self.direction)
+        if regroup is not None and not regroup(scene):
             refusal = {'IN': "Select a single layer to group", 'OUT': "This layer is not in a group"}
             return self.refused(refusal[self.direction])
-        if self.direction in {'UP', 'DOWN'} and not move_layer(scene, -1 if self.direction == 'UP' else 1):
+        if self.direction in {'UP', 'DOWN'} and not layers.move_layer(scene, -1 if self.direction == 'UP' else 1):
             return {'CANCELLED'}
         points.schedule()
         return {'FINISHED'}
@@ -282,7 +250,7 @@ class TETFLORA_OT_duplicate_layer(Reporting, bpy.types.Operator):
         grounds = selected_grounds(context) if self.to_selected else None
         if grounds == []:
             return self.failed("Select a mesh to copy the layer to")
-        made = copy_layer(context.scene, active_layer(context.scene), grounds)
+        made = layers.copy_layer(context.scene, layers.active_layer(context.scene), grounds)
         points.schedule()
         return self.done(f'"{made.name}" added; click Update to grow it')
 
@@ -298,14 +266,14 @@ class TETFLORA_OT_remove_layer(Reporting, bpy.types.Operator):
     keep_plants: once.boolean("Keep Plants", "Remove only the layer, and keep its plants as plants of your own")
 
     def run(self, context: bpy.types.Context) -> set[str]:
-        scene, layer = context.scene, active_layer(context.scene)
+        scene, layer = context.scene, layers.active_layer(context.scene)
         name, number = layer.name, 0
         if layer.kind == BIOME and not self.keep_plants:
-            number = remove_biome(scene, layer)
+            number = adding.remove_biome(scene, layer)
         else:
-            for uid in [*(one.uid for one in children_of(layer)), layer.uid]:
-                number += remove_layer(scene, index_of(scene, uid), self.keep_plants)
-        forget_gone(scene)
+            for uid in [*(one.uid for one in layers.children_of(layer)), layer.uid]:
+                number += remove_layer(scene, layers.index_of(scene, uid), self.keep_plants)
+        layers.forget_gone(scene)
         points.schedule()
         return self.done(f'"{name}" removed with {counted(number, "plant")}')
 
@@ -317,8 +285,8 @@ class TETFLORA_OT_set_layer_ground(Reporting, bpy.types.Operator):
     needs = (*_ACTIVE, ground_selected)
 
     def run(self, context: bpy.types.Context) -> set[str]:
-        layer = active_layer(context.scene)
-        for one in (layer, *children_of(layer)):
+        layer = layers.active_layer(context.scene)
+        for one in (layer, *layers.children_of(layer)):
             set_grounds(one.field.tetflora.stand if one.kind == FIELD and one.field else one, selected_grounds(context))
         points.schedule()
         return {'FINISHED'}
@@ -337,7 +305,7 @@ class TETFLORA_OT_ground_snow(Reporting, bpy.types.Operator):
     )
 
     def run(self, context: bpy.types.Context) -> set[str]:
-        found = cover_with_snow(context.scene, covered_population(context.scene))
+        found = cover.cover_with_snow(context.scene, cover.covered_population(context.scene))
         if not found:
             return self.refused("The materials of the ground have snow already")
         return self.done(f"{counted(len(found), 'material')} can have snow; set Snow under Season and Wind")
@@ -384,7 +352,7 @@ class TETFLORA_OT_add_biome(ModalJob, bpy.types.Operator):
         "Set Season", "Turn on Seasons and go to the day of the year that the biome is made for, if it has one"
     )
 
-    def steps(self, context: bpy.types.Context) -> Job[BiomeResult]:
+    def steps(self, context: bpy.types.Context) -> Job[adding.BiomeResult]:
         yield Progress(0.0, "Reading the biome")
         scene = context.scene
         if not self.properties.is_property_set("biome"):
@@ -395,14 +363,16 @@ class TETFLORA_OT_add_biome(ModalJob, bpy.types.Operator):
         grounds, land = selected_grounds(context), None
         cube = scene.objects.get("Cube") if is_startup(scene) else None
         if cube is not None or not grounds:
-            land = make_land(scene, biome.ground, self.seed)
+            land = adding.make_land(scene, biome.ground, self.seed)
             grounds = [land]
         hidden = [] if cube is None else [(cube, cube.hide_viewport, cube.hide_render)]
         for obj, *_ in hidden:
             obj.hide_viewport = obj.hide_render = True
         try:
             context.view_layer.update()
-            made = yield from add_biome_steps(scene, context.evaluated_depsgraph_get(), biome, grounds, self.seed)
+            made = yield from adding.add_biome_steps(
+                scene, context.evaluated_depsgraph_get(), biome, grounds, self.seed
+            )
         except BaseException:  # an error, or Esc
             if is_there(land):
                 bpy.data.meshes.remove(land.data)
@@ -417,7 +387,7 @@ class TETFLORA_OT_add_biome(ModalJob, bpy.types.Operator):
         select_only(context, grounds)
         return made
 
-    def finish(self, context: bpy.types.Context, result: BiomeResult) -> set[str]:
+    def finish(self, context: bpy.types.Context, result: adding.BiomeResult) -> set[str]:
         points.schedule()
         sun = any(o.type == 'LIGHT' and o.data.type == 'SUN' for o in context.scene.objects)
         before = "" if sun else "Daylight, then "
@@ -451,14 +421,14 @@ class TETFLORA_OT_ground_cover(ModalJob, bpy.types.Operator):
         True,
     )
 
-    def steps(self, context: bpy.types.Context) -> Job[CoverResult]:
+    def steps(self, context: bpy.types.Context) -> Job[cover.CoverResult]:
         scene, depsgraph = context.scene, context.evaluated_depsgraph_get()
-        made = yield from cover_steps(scene, depsgraph, covered_population(scene), self.soil)
+        made = yield from cover.cover_steps(scene, depsgraph, cover.covered_population(scene), self.soil)
         if self.fallen and scene.tetflora.year.enabled:
-            yield from strew_steps(scene, depsgraph, covered_population(scene))
+            yield from cover.strew_steps(scene, depsgraph, cover.covered_population(scene))
         return made
 
-    def finish(self, context: bpy.types.Context, result: CoverResult) -> set[str]:
+    def finish(self, context: bpy.types.Context, result: cover.CoverResult) -> set[str]:
         points.schedule()
         kept = f'; "{result.bare[0]}" keeps its own material' if result.bare else ""
         if not result.made.number:
@@ -476,10 +446,10 @@ class TETFLORA_OT_grow_stand(ModalJob, bpy.types.Operator):
     bl_label = "Grow Stand"
     needs = (in_object_mode, ground_found)
 
-    def steps(self, context: bpy.types.Context) -> Job[GrownStand]:
-        return new_stand_steps(context.scene, context.evaluated_depsgraph_get(), grounds_to_plant(context))
+    def steps(self, context: bpy.types.Context) -> Job[growing.GrownStand]:
+        return growing.new_stand_steps(context.scene, context.evaluated_depsgraph_get(), grounds_to_plant(context))
 
-    def finish(self, context: bpy.types.Context, result: GrownStand) -> set[str]:
+    def finish(self, context: bpy.types.Context, result: growing.GrownStand) -> set[str]:
         select_only(context, [result.field])
         context.scene.update_tag()
         return self.done(f"{counted(result.plants, 'plant')} after {counted(result.years, 'year')}")
@@ -487,9 +457,9 @@ class TETFLORA_OT_grow_stand(ModalJob, bpy.types.Operator):
 
 def active_stand(context: bpy.types.Context) -> bpy.types.Object | None:
     """The stand that is the active object, or else the active layer."""
-    layer = active_layer(context.scene)
+    layer = layers.active_layer(context.scene)
     found = (context.active_object, None if layer is None else layer.field)
-    return next((obj for obj in found if is_stand(obj)), None)
+    return next((obj for obj in found if growing.is_stand(obj)), None)
 
 
 _OF_STAND = (
@@ -519,7 +489,7 @@ class TETFLORA_OT_animate_growth(Reporting, bpy.types.Operator):
             self.last = scene.frame_end
         if self.last <= self.first:
             return self.refused("Last Frame must be after First Frame")
-        begin, end = animate(active_stand(context), self.first, self.last)
+        begin, end = growing.animate(active_stand(context), self.first, self.last)
         scene.frame_set(scene.frame_current)
         return self.done(f"Year {begin:g} at frame {self.first}, year {end:g} at frame {self.last}")
 
@@ -539,7 +509,7 @@ class TETFLORA_OT_keep_year(Reporting, bpy.types.Operator):
         return context.window_manager.invoke_confirm(self, event, message=text, confirm_text=self.bl_label)
 
     def run(self, context: bpy.types.Context) -> set[str]:
-        number = keep_year(active_stand(context))
+        number = growing.keep_year(active_stand(context))
         context.scene.update_tag()
         return self.done(f"{counted(number, 'plant')} kept")
 

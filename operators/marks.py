@@ -10,13 +10,7 @@ import bpy
 from ..tetflora_addon.blender.assets.marks import can_be_species, is_species, scattered, stop_using, use_as_species
 from ..tetflora_addon.blender.biomes.layers import forget_gone
 from ..tetflora_addon.blender.declare import boolean, choice, once, string
-from ..tetflora_addon.blender.placing.plant_objects import (
-    field_from_plants,
-    note_field,
-    plants_from_field,
-    plants_of,
-    prepare_scene,
-)
+from ..tetflora_addon.blender.placing import plant_objects
 from ..tetflora_addon.blender.placing.populations import adopt, collection_of, owner_of
 from ..tetflora_addon.blender.placing.properties import MOST_EMPTIES
 from ..tetflora_addon.blender.scene.fields import FIELD_TYPES, fields_of
@@ -135,8 +129,8 @@ class TETFLORA_OT_mark(Reporting, bpy.types.Operator):
         field.is_plant = False
         if not field.field_species:
             field.field_species.add().species = field.species or default_species()
-        note_field(context.scene, obj)
-        prepare_scene(context.scene)
+        plant_objects.note_field(context.scene, obj)
+        plant_objects.prepare_scene(context.scene)
         return self.done(f'The points of "{obj.name}" are now plants')
 
     def _mark_scatters(self, context: bpy.types.Context) -> set[str]:
@@ -165,7 +159,7 @@ class TETFLORA_OT_mark(Reporting, bpy.types.Operator):
             left += sum(scatter.left.values())
         if not done:
             return self.failed(wrong[0])
-        prepare_scene(context.scene)
+        plant_objects.prepare_scene(context.scene)
         text = f"{counted(instances, 'instance')} of {counted(len(assets), 'asset')} will be refined"
         text += f"; {counted(left, 'instance')} without faces will not show in results" if left else ""
         return self.done(f"{text}; {wrong[0]}" if wrong else text)
@@ -208,7 +202,7 @@ class TETFLORA_OT_convert_plants(Reporting, bpy.types.Operator):
         return self._to_field(context) if self.to == 'FIELD' else self._to_objects(context)
 
     def _to_field(self, context: bpy.types.Context) -> set[str]:
-        if not (selected := plants_of(context.selected_objects)):
+        if not (selected := plant_objects.plants_of(context.selected_objects)):
             return self.refused("Select plants first")
         plants = [o for o in selected_plants(context) if o.tetflora.enabled and not o.hide_render]
         if not plants:
@@ -216,7 +210,7 @@ class TETFLORA_OT_convert_plants(Reporting, bpy.types.Operator):
         left = len(selected) - len(plants)
         owner = owner_of(context.scene, plants)
         home = collection_of(context.scene, owner) if owner else None
-        field = field_from_plants(context.scene, context.evaluated_depsgraph_get(), plants, home)
+        field = plant_objects.field_from_plants(context.scene, context.evaluated_depsgraph_get(), plants, home)
         if owner:  # or its next update would plant them once more
             adopt(context.scene, owner, [field])
         select_only(context, [field])
@@ -229,7 +223,7 @@ class TETFLORA_OT_convert_plants(Reporting, bpy.types.Operator):
         for field in [o for o in fields_of(context.selected_objects) if o.library is None]:
             owner = owner_of(context.scene, [field])
             home = collection_of(context.scene, owner) if owner else None
-            plants = plants_from_field(context.scene, depsgraph, field, MOST_EMPTIES - len(made), home)
+            plants = plant_objects.plants_from_field(context.scene, depsgraph, field, MOST_EMPTIES - len(made), home)
             if owner:
                 adopt(context.scene, owner, plants)
             made += plants
@@ -336,7 +330,7 @@ class TETFLORA_OT_use_as_species(Reporting, bpy.types.Operator):
                 wrong.append(str(error))
         if not names:
             return self.failed(wrong[0])
-        prepare_scene(context.scene)
+        plant_objects.prepare_scene(context.scene)
         text = listed(names)
         text += " can now be planted as a species" if len(names) == 1 else " can now be planted as species"
         return self.done(f"{text}; {wrong[0]}" if wrong else text)

@@ -12,30 +12,18 @@ from bpy_extras.io_utils import ImportHelper
 from ..tetflora_addon.blender.declare import once
 from ..tetflora_addon.blender.export.usd import ENDINGS as USD_ENDINGS
 from ..tetflora_addon.blender.export.usd import forest_steps
+from ..tetflora_addon.blender.geodata import trees
 from ..tetflora_addon.blender.geodata.origin import EXISTING, MIDDLE, WHOLE, Import, Imported, Steps
 from ..tetflora_addon.blender.geodata.terrain import PATTERN, outline_steps, terrain_steps
-from ..tetflora_addon.blender.geodata.trees import (
-    GENERIC,
-    LEFT_OUT,
-    TetFloraInventoryColumn,
-    canopy_steps,
-    chosen_columns,
-    columns_in,
-    inventory_steps,
-    show_columns,
-)
 from ..tetflora_addon.blender.species.catalog import NO_SPECIES, operator_items
 from ..tetflora_addon.errors import TetFloraError
-from ..tetflora_addon.geodata.inventories import IMPERIAL, METRIC
-from ..tetflora_addon.geodata.layers import ENDINGS
-from ..tetflora_addon.geodata.outlines import KINDS
-from ..tetflora_addon.geodata.projection import PLAIN
+from ..tetflora_addon.geodata import inventories, layers, outlines, projection
 from ..tetflora_addon.parameters import within
 from .add import mix_in, parse_weights
 from .base import FileJob, in_object_mode, select_only
 from .layers import selected_grounds
 
-_LAYERS, _FORESTS = (";".join(f"*{ending}" for ending in endings) for endings in (ENDINGS, USD_ENDINGS))
+_LAYERS, _FORESTS = (";".join(f"*{ending}" for ending in endings) for endings in (layers.ENDINGS, USD_ENDINGS))
 
 
 def _file(text: str) -> Path | None:
@@ -86,7 +74,7 @@ class _Importing(FileJob, ImportHelper):
 
     def order(self, context: bpy.types.Context, **others: Any) -> Import:
         """What is to be imported."""
-        epsg = PLAIN if self.plain else self.epsg
+        epsg = projection.PLAIN if self.plain else self.epsg
         selected, graph = tuple(selected_grounds(context)), context.evaluated_depsgraph_get()
         crop = {"crop": self.crop, "side": self.crop_size}
         return Import(context.scene, graph, self.path, epsg, self.new_origin, selected, **crop, **others)
@@ -160,17 +148,17 @@ class TETFLORA_OT_import_inventory(_Importing, bpy.types.Operator):
         "Units",
         "Units of columns that do not name theirs",
         (
-            (METRIC, "Metric", "Meters; trunks in centimeters, unless they are too thin for that"),
-            (IMPERIAL, "Imperial", "Feet; trunks in inches"),
+            (inventories.METRIC, "Metric", "Meters; trunks in centimeters, unless they are too thin for that"),
+            (inventories.IMPERIAL, "Imperial", "Feet; trunks in inches"),
         ),
     )
     unknown: once.choice(
         "Unknown Species",
         "What stands for trees whose species is not known here",
         (
-            (GENERIC, "Generic Tree", "A conifer where the name tells that it is one, else a broadleaf tree"),
+            (trees.GENERIC, "Generic Tree", "A conifer where the name tells that it is one, else a broadleaf tree"),
             ('SPECIES', "Species", "The species below"),
-            (LEFT_OUT, "Leave Out", "No tree"),
+            (trees.LEFT_OUT, "Leave Out", "No tree"),
         ),
     )
     species: once.choice("Species", "Species that stands for unknown ones", operator_items)
@@ -181,14 +169,14 @@ class TETFLORA_OT_import_inventory(_Importing, bpy.types.Operator):
         "JSON object of what columns hold, for those whose titles and values do not tell it: "
         '{"Hoogte dm": "height", "X1": "crown_width ft", "X2": ""}',
     )
-    table: CollectionProperty(type=TetFloraInventoryColumn, options={'HIDDEN', 'SKIP_SAVE'})
+    table: CollectionProperty(type=trees.TetFloraInventoryColumn, options={'HIDDEN', 'SKIP_SAVE'})
     active: IntProperty(options={'HIDDEN', 'SKIP_SAVE'})
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
         if not self.chosen or self.columns or self._is_forest:
             return super().invoke(context, event)
         try:
-            show_columns(self.table, self.path)
+            trees.show_columns(self.table, self.path)
         except (OSError, TetFloraError) as error:
             return self.failed(str(error))
         self._browsing = True
@@ -197,7 +185,7 @@ class TETFLORA_OT_import_inventory(_Importing, bpy.types.Operator):
     def as_keywords(self, *, ignore: tuple[str, ...] = ()) -> dict[str, Any]:
         """Settings of another call, which takes columns as the table has them."""
         found = super().as_keywords(ignore=(*ignore, "table", "active"))
-        return found | ({"columns": chosen_columns(self.table)} if self.table else {})
+        return found | ({"columns": trees.chosen_columns(self.table)} if self.table else {})
 
     def draw(self, _context: bpy.types.Context) -> None:
         layout = self.layout
@@ -222,7 +210,7 @@ class TETFLORA_OT_import_inventory(_Importing, bpy.types.Operator):
         if self._is_forest:
             return forest_steps(self.order(context), parse_weights(mix_in(context.scene.tetflora.populate)))
         chosen = self.species if self.unknown == 'SPECIES' and self.species != NO_SPECIES else self.unknown
-        return inventory_steps(self.order(context), chosen, self.units, self.skip, columns_in(self.columns))
+        return trees.inventory_steps(self.order(context), chosen, self.units, self.skip, trees.columns_in(self.columns))
 
 
 class TETFLORA_OT_import_canopy(_Raster, bpy.types.Operator):
@@ -247,7 +235,7 @@ class TETFLORA_OT_import_canopy(_Raster, bpy.types.Operator):
 
     def steps(self, context: bpy.types.Context) -> Steps:
         self.species = self.species or mix_in(context.scene.tetflora.populate)
-        return canopy_steps(self.order(context), parse_weights(self.species), self.min_height, _file(self.below))
+        return trees.canopy_steps(self.order(context), parse_weights(self.species), self.min_height, _file(self.below))
 
 
 class TETFLORA_OT_import_outlines(_Importing, bpy.types.Operator):
@@ -264,7 +252,7 @@ class TETFLORA_OT_import_outlines(_Importing, bpy.types.Operator):
         "What all areas and lines of the file are",
         (
             ('KEYS', "Told by Their Keys", "What each says that it is, by the keys of OpenStreetMap or others"),
-            *((kind.upper(), kind, f"All are {kind.lower()}") for kind in KINDS),
+            *((kind.upper(), kind, f"All are {kind.lower()}") for kind in outlines.KINDS),
         ),
     )
 

@@ -6,17 +6,8 @@ import bpy
 
 from ..tetflora_addon.blender.biomes.layers import active_layer, children_of, forget_gone
 from ..tetflora_addon.blender.declare import choice, once
+from ..tetflora_addon.blender.placing import plant_objects
 from ..tetflora_addon.blender.placing.ground import DropResult, drop_steps
-from ..tetflora_addon.blender.placing.plant_objects import (
-    assign_field_species,
-    assign_species,
-    editable,
-    plants_of,
-    remove_fields,
-    remove_plants,
-    reseed,
-    reseed_field,
-)
 from ..tetflora_addon.blender.placing.populations import own_objects, recount
 from ..tetflora_addon.blender.scene.fields import fields_of, stored_size
 from ..tetflora_addon.blender.settings import SCATTER
@@ -40,9 +31,9 @@ class TETFLORA_OT_assign_species(Reporting, bpy.types.Operator):
     def run(self, context: bpy.types.Context) -> set[str]:
         if self.species in {"", NO_SPECIES}:
             return self.failed("Choose a species")
-        changed = assign_species(selected_plants(context), self.species)
+        changed = plant_objects.assign_species(selected_plants(context), self.species)
         for field in fields_of(context.selected_objects):
-            if assign_field_species(field, self.species):
+            if plant_objects.assign_field_species(field, self.species):
                 changed += stored_size(field)
         return self.done(f"{counted(changed, 'plant')} changed")
 
@@ -59,10 +50,10 @@ class TETFLORA_OT_reseed(Reporting, bpy.types.Operator):
     roll: once.integer("Roll", "A different number gives different plants", **within(0, 100))
 
     def run(self, context: bpy.types.Context) -> set[str]:
-        number = reseed(selected_plants(context), self.roll)
+        number = plant_objects.reseed(selected_plants(context), self.roll)
         fields = sorted((o for o in fields_of(context.selected_objects) if o.library is None), key=lambda o: o.name)
         for place, field in enumerate(fields):
-            reseed_field(field, place, self.roll)
+            plant_objects.reseed_field(field, place, self.roll)
             number += stored_size(field)
         return self.done(f"{counted(number, 'plant')} re-rolled")
 
@@ -91,7 +82,9 @@ class TETFLORA_OT_select_plants(Reporting, bpy.types.Operator):
             if not self.species and (active is None or not active.tetflora.is_plant):
                 return self.failed("The active object must be a plant; select one")
             self.species = self.species or active.tetflora.species
-            found = [o for o in plants_of(context.view_layer.objects) if o.tetflora.species == self.species]
+            found = [
+                o for o in plant_objects.plants_of(context.view_layer.objects) if o.tetflora.species == self.species
+            ]
         if not self.extend:
             for obj in context.selected_objects:
                 obj.select_set(False)
@@ -123,7 +116,9 @@ class TETFLORA_OT_remove_plants(Reporting, bpy.types.Operator):
 
     def run(self, context: bpy.types.Context) -> set[str]:
         objects = context.selected_objects if self.which == 'SELECTED' else context.scene.objects
-        plants = [o for o in plants_of(objects) if self.which != 'SPECIES' or o.tetflora.species == self.species]
+        plants = [
+            o for o in plant_objects.plants_of(objects) if self.which != 'SPECIES' or o.tetflora.species == self.species
+        ]
         fields = [] if self.which == 'SPECIES' else fields_of(objects)
         local = [o for o in (*plants, *fields) if o.library is None]
         if (plants or fields) and not local:
@@ -135,7 +130,7 @@ class TETFLORA_OT_remove_plants(Reporting, bpy.types.Operator):
                 'ALL': "The scene has no plants",
             }
             return self.refused(f"{none[self.which]}; nothing removed")
-        number = remove_plants(plants) + remove_fields(fields)
+        number = plant_objects.remove_plants(plants) + plant_objects.remove_fields(fields)
         recount(context.scene)
         forget_gone(context.scene)
         return self.done(f"{counted(number, 'plant')} removed")
@@ -151,11 +146,11 @@ class TETFLORA_OT_drop_to_ground(ModalJob, bpy.types.Operator):
     needs = (in_object_mode, plants_or_fields_selected)
 
     def steps(self, context: bpy.types.Context) -> Job[DropResult]:
-        fields = [field for field in fields_of(context.selected_objects) if editable(field)]
+        fields = [field for field in fields_of(context.selected_objects) if plant_objects.editable(field)]
         return drop_steps(context.scene, context.evaluated_depsgraph_get(), selected_plants(context), fields)
 
     def finish(self, context: bpy.types.Context, result: DropResult) -> set[str]:
-        left = [field.name for field in fields_of(context.selected_objects) if not editable(field)]
+        left = [field.name for field in fields_of(context.selected_objects) if not plant_objects.editable(field)]
         notes = [f"{counted(result.missed, 'plant')} had no ground below or above"] if result.missed else []
         if left:
             notes.append(f'"{left[0]}" was not moved: it has modifiers, or was not created by TetFlora')

@@ -127,12 +127,14 @@ def _unseen(scene: bpy.types.Scene, statistics: Statistics) -> str:
     )
 
 
-def _clearable(scene: bpy.types.Scene) -> bool:
-    """Whether there are results, or meshes that they left hidden when they were deleted by hand.
-
-    Only then are all objects looked through: a panel asks at every movement of the mouse.
-    """
-    return has_results(scene) or bool(scene.tetflora.statistics and hiding.hidden_originals(scene))
+# Meshes stay hidden where results were deleted by hand. Only then are all objects looked through: a panel asks at every
+# movement of the mouse.
+_clearable = need(
+    lambda context: (
+        has_results(context.scene) or (context.scene.tetflora.statistics and hiding.hidden_originals(context.scene))
+    ),
+    "No results to clear",
+)
 
 
 class TETFLORA_OT_clear(Reporting, bpy.types.Operator):
@@ -142,7 +144,7 @@ class TETFLORA_OT_clear(Reporting, bpy.types.Operator):
     """
 
     bl_label = "Clear"
-    needs = (in_object_mode, need(lambda context: _clearable(context.scene), "No results to clear"))
+    needs = (in_object_mode, _clearable)
 
     def run(self, context: bpy.types.Context) -> set[str]:
         auto.stop()

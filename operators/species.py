@@ -15,17 +15,9 @@ from ..tetflora_addon.blender.biomes import library
 from ..tetflora_addon.blender.declare import choice, once, string
 from ..tetflora_addon.blender.placing.assets import add_to_preferences, write_asset_library
 from ..tetflora_addon.blender.placing.plant_objects import assign_species
+from ..tetflora_addon.blender.species import edits
 from ..tetflora_addon.blender.species.catalog import OWN_FILES, load_species_file, save_species, write_species
 from ..tetflora_addon.blender.species.editor import orders_of, present_species
-from ..tetflora_addon.blender.species.edits import (
-    catalog,
-    change_species,
-    find_edit,
-    new_identifier,
-    revert_species,
-    species_data,
-    store_species,
-)
 from ..tetflora_addon.species.catalog import DEFAULT_SPUR
 from ..tetflora_addon.species.skeletons import MAX_ORDERS
 from .base import FileTool, Reporting, counted, need, selected_plants
@@ -36,7 +28,7 @@ def shown(context: bpy.types.Context) -> str:
     return present_species(context.scene.tetflora.species_editor)
 
 
-species_shown = need(lambda context: shown(context) in catalog(), "Choose a species from the catalog first")
+species_shown = need(lambda context: shown(context) in edits.catalog(), "Choose a species from the catalog first")
 
 
 class TETFLORA_OT_duplicate_species(Reporting, bpy.types.Operator):
@@ -56,11 +48,11 @@ class TETFLORA_OT_duplicate_species(Reporting, bpy.types.Operator):
     def run(self, context: bpy.types.Context) -> set[str]:
         scene = context.scene
         editor = scene.tetflora.species_editor
-        data = copy.deepcopy(species_data(scene, present_species(editor)))
+        data = copy.deepcopy(edits.species_data(scene, present_species(editor)))
         data["name"] = self.name.strip() or self._suggestion(context)
-        known = catalog()
-        identifier = new_identifier(data["name"], known.__contains__)
-        store_species(scene, identifier, data)
+        known = edits.catalog()
+        identifier = edits.new_identifier(data["name"], known.__contains__)
+        edits.store_species(scene, identifier, data)
         editor.species = identifier
         changed = assign_species(selected_plants(context), identifier) if self.assign else 0
         given = f", assigned to {counted(changed, 'plant')}" if self.assign else ""
@@ -68,7 +60,7 @@ class TETFLORA_OT_duplicate_species(Reporting, bpy.types.Operator):
 
     @staticmethod
     def _suggestion(context: bpy.types.Context) -> str:
-        known = catalog()
+        known = edits.catalog()
         old = known[shown(context)].name
         names = {info.name for info in known.values()}
         return next(name for n in range(2, len(names) + 3) if (name := f"{old} {n}") not in names)
@@ -81,13 +73,15 @@ class TETFLORA_OT_revert_species(Reporting, bpy.types.Operator):
     """
 
     bl_label = "Revert"
-    needs = (need(lambda context: find_edit(context.scene, shown(context)), "The species has no changes to revert"),)
+    needs = (
+        need(lambda context: edits.find_edit(context.scene, shown(context)), "The species has no changes to revert"),
+    )
 
     def run(self, context: bpy.types.Context) -> set[str]:
         editor = context.scene.tetflora.species_editor
         identifier = present_species(editor)
-        revert_species(identifier)
-        if identifier in catalog():
+        edits.revert_species(identifier)
+        if identifier in edits.catalog():
             return self.done(f'"{identifier}" reverted to the catalog')
         editor.species = ""
         return self.done(f'Species "{identifier}" removed from this file')
@@ -117,13 +111,13 @@ class TETFLORA_OT_edit_orders(Reporting, bpy.types.Operator):
         if not number:
             return self.refused("The species has orders that cannot be read; revert it first")
         if self.action == 'SPUR':
-            change_species(scene, present_species(editor), _toggle_spur)
+            edits.change_species(scene, present_species(editor), _toggle_spur)
             return {'FINISHED'}
         if self.action == 'ADD' and number >= MAX_ORDERS:
             return self.refused(f"A species cannot have more than {MAX_ORDERS} orders")
         if self.action == 'REMOVE' and number < 2:
             return self.refused("The trunk cannot be removed: a species has at least one order")
-        change_species(scene, present_species(editor), _add if self.action == 'ADD' else _remove)
+        edits.change_species(scene, present_species(editor), _add if self.action == 'ADD' else _remove)
         editor.order_index = number if self.action == 'ADD' else min(editor.order_index, number - 2)
         return {'FINISHED'}
 
@@ -178,7 +172,7 @@ class TETFLORA_OT_load_species(FileTool, bpy.types.Operator, ImportHelper):
     def run(self, context: bpy.types.Context) -> set[str]:
         identifier = load_species_file(self.path, self.replace)
         context.scene.tetflora.species_editor.species = identifier
-        return self.done(f'Species "{catalog()[identifier].name}" loaded')
+        return self.done(f'Species "{edits.catalog()[identifier].name}" loaded')
 
 
 class TETFLORA_OT_export_species(FileTool, bpy.types.Operator, ExportHelper):

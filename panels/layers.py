@@ -25,7 +25,14 @@ from .base import (
     shown_length,
     split_layout,
 )
-from .places import IMPORTS
+
+#: Imports of real places, in the order in which a place is built.
+IMPORTS = (
+    Button("import_terrain", 'RNDCURVE'),
+    Button("import_canopy", 'OUTLINER_OB_POINTCLOUD'),
+    Button("import_inventory", 'SPREADSHEET'),
+    Button("import_outlines", 'OUTLINER_OB_CURVE'),
+)
 
 
 class TETFLORA_UL_layers(bpy.types.UIList):

@@ -1,14 +1,15 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Entries in the Add and Object menus, the pie menu, and the menu that a render without plants opens."""
+"""Entries in Blender's menus, the pie menu, and the menu that a render without plants opens; an inventory's columns."""
 
 import bpy
 
+from ..operators.places import column_row
 from ..tetflora_addon.blender.runtime import open_menu
 from ..tetflora_addon.blender.species.edits import catalog
 from ..tetflora_addon.species.catalog import FIRST
 from .base import Button, draw_buttons, thumbnail
-from .layers import FALLBACK_ICON, TETFLORA_MT_add_biome, TETFLORA_MT_layers
+from .layers import FALLBACK_ICON, IMPORTS, TETFLORA_MT_add_biome, TETFLORA_MT_layers
 from .preferences import PIE
 
 
@@ -147,6 +148,34 @@ def draw_in_outliner(menu: bpy.types.Menu, _context: bpy.types.Context) -> None:
         Button("use_as_species", 'ASSET_MANAGER', "Use as TetFlora Species"),
         Button("use_as_species", 'X', "Stop Using as TetFlora Species", {"stop": True}),
     )
+
+
+_ENDINGS = (
+    *("Terrain (.tif, .asc, .hgt)", "Canopy Height (.tif, .asc, .xyz)"),
+    *("Tree Inventory (.csv, .geojson, .usd)", "Map Outlines (.geojson, .shp, .gpkg)"),
+)
+
+
+class TETFLORA_UL_inventory_columns(bpy.types.UIList):
+    """Columns of an inventory that is about to be imported."""
+
+    def draw_item(self, _context, layout, _data, item, _icon, _active_data, _active_property, _index, _flag) -> None:
+        row = column_row(layout, item.name, item.values)
+        row.prop(item, "field", text="")
+        row.prop(item, "unit", text="")
+
+
+def draw_in_import_menu(menu: bpy.types.Menu, _context: bpy.types.Context) -> None:
+    """Entries in Blender's File > Import."""
+    menu.layout.separator()
+    for button, text in zip(IMPORTS, _ENDINGS, strict=True):
+        button._replace(text=text).draw(menu.layout)
+
+
+def draw_in_export_menu(menu: bpy.types.Menu, _context: bpy.types.Context) -> None:
+    """The entry in Blender's File > Export."""
+    menu.layout.separator()
+    Button("export_forest", 'OUTLINER_OB_FORCE_FIELD', "TetFlora Forest (.usd, .glb, .obj)").draw(menu.layout)
 
 
 class TETFLORA_MT_pie(bpy.types.Menu):

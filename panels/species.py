@@ -77,7 +77,7 @@ class TETFLORA_PT_species(SidebarPanel, bpy.types.Panel):
             draw_message(context, layout, problem)
         for text in skipped_files()[:_MOST_TOLD]:
             draw_message(context, layout, text)
-        shown = species.shown_in(scene)
+        shown = species.switch.shown_in(scene)
         row = layout.row(align=True)
         row.use_property_split = False
         row.prop(context.window_manager, "tetflora_species", icon='HIDE_OFF' if shown else 'HIDE_ON', toggle=True)

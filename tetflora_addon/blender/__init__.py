@@ -7,12 +7,13 @@ from .biomes import layers, library
 from .cli import command
 from .job import forecast, render
 from .placing import assets
+from .runtime import in_order
 from .species import catalog, edits
 from .viewport import auto, levels, overlay, points, warnings
 from .viewport import species as species_preview  # or the room of that name could not be read as an attribute
 
 # Handlers and commands read properties, so those come first.
-_PARTS = (
+register, unregister = in_order(
     main_thread,
     worker,
     runtime,
@@ -35,15 +36,3 @@ _PARTS = (
     command,
     translations,
 )
-
-
-def register() -> None:
-    """Register all parts in order."""
-    for part in _PARTS:
-        part.register()
-
-
-def unregister() -> None:
-    """Unregister all parts in reverse order."""
-    for part in reversed(_PARTS):
-        part.unregister()

@@ -15,14 +15,15 @@ from functools import partial, wraps
 from math import inf
 from pathlib import Path
 from textwrap import wrap
-from traceback import FrameSummary, extract_tb
-from typing import Any, Generic, TypeVar
+from traceback import extract_tb
+from typing import Any, Generic, NamedTuple, TypeVar
 
 import bpy
 from bpy.app.handlers import persistent
 
 from ..errors import SceneError, readable
 from ..processes import pool
+from .declare import once
 from .main_thread import in_main_thread, later, on_main_thread
 
 _Datablock = TypeVar("_Datablock", bound=bpy.types.ID)
@@ -30,6 +31,34 @@ _Datablock = TypeVar("_Datablock", bound=bpy.types.ID)
 _LINE = 100
 #: Errors of the last render: a text for each frame that was rendered without its plants.
 failed_frames: list[str] = []
+
+
+class Part(NamedTuple):
+    """What is there while the add-on is enabled: modules and others have two such functions as well."""
+
+    register: Callable[[], object]
+    unregister: Callable[[], object]
+
+
+def in_order(*parts: Any, end: Callable[[], object] | None = None) -> Part:
+    """Parts that are registered in this order, and unregistered in the reverse one, after what ``end`` does."""
+
+    def register() -> None:
+        for part in parts:
+            part.register()
+
+    def unregister() -> None:
+        if end is not None:
+            end()
+        for part in reversed(parts):
+            part.unregister()
+
+    return Part(register, unregister)
+
+
+def listening(function: Callable[..., object], *listeners: Any) -> Part:
+    """Let a function be called by `Listeners`, or draw in menus of Blender's, which take functions alike."""
+    return in_order(*(Part(partial(one.append, function), partial(one.remove, function)) for one in listeners))
 
 
 class Handlers:
@@ -150,6 +179,93 @@ class Outlook(Generic[_Result]):
         self._handlers.unregister()
         call_off(self._timer)
         self._found = {}
+
+
+class SceneSwitch:
+    """What a switch of the window shows of one scene, made anew a moment after each change.
+
+    It belongs to the session: the scene is known by its `session_uid`, and forgotten when a file is loaded.
+
+    Parameters
+    ----------
+    name, label, tooltip : str
+        Of the switch, a property of the window manager.
+    make : callable
+        Makes it; gets the scene, or None where it is off or gone.
+    clear : callable
+        Takes away what was made.
+    soon : float
+        Seconds from a change; as many as making it took where that is more, or a slider that is dragged would stand.
+    drawn : bool
+        Whether there is nothing to make where no window draws it.
+    """
+
+    def __init__(
+        self,
+        name: str,
+        label: str,
+        tooltip: str,
+        make: Callable[[bpy.types.Scene | None], None],
+        clear: Callable[[], None],
+        soon: float,
+        drawn: bool,
+    ) -> None:
+        self._about, self._make, self._clear, self._soon, self._drawn, self._took = (
+            (name, label, tooltip),
+            make,
+            clear,
+            soon,
+            drawn,
+            0.0,
+        )
+        self.scene: int | None = None
+        self.refresh = partial(self._refresh)  # one object, which Blender can find again
+
+    def shown_in(self, scene: bpy.types.Scene) -> bool:
+        """Whether it is switched on in a scene."""
+        return self.scene == scene.session_uid
+
+    def show(self, scene: bpy.types.Scene, on: bool) -> None:
+        """Switch it on or off for a scene."""
+        self._clear()
+        self.scene = scene.session_uid if on else None
+        self.schedule()
+
+    def schedule(self) -> None:
+        """Make it anew soon; many changes in a row are one."""
+        if self.scene is not None:
+            self.look()
+
+    def look(self) -> None:
+        """The same, or take it away where it is off."""
+        if not (self._drawn and bpy.app.background):
+            call_soon(self.refresh, max(self._soon, self._took))
+
+    def _refresh(self) -> None:
+        begin = time.perf_counter()
+        self._make(with_uid(bpy.data.scenes, self.scene))
+        self._took = time.perf_counter() - begin
+
+    def forget(self) -> None:
+        """Forget the scene, and what was made."""
+        self.scene = None
+        call_off(self.refresh)
+        self._clear()
+
+    def register(self) -> None:
+        """Add the switch."""
+        name, *texts = self._about
+        switch = once.boolean(
+            *texts,
+            get=lambda _: bpy.context.scene is not None and self.shown_in(bpy.context.scene),
+            set=lambda _, on: self.show(bpy.context.scene, on),
+        )
+        setattr(bpy.types.WindowManager, name, switch)
+
+    def unregister(self) -> None:
+        """Take it away, and what it shows."""
+        delattr(bpy.types.WindowManager, self._about[0])
+        self.forget()
 
 
 def is_there(datablock: bpy.types.ID | None) -> bool:
@@ -305,12 +421,9 @@ def register() -> None:
 def remember(text: str, error: BaseException | None = None) -> None:
     """Keep the last error of the session for a report, and where it was; the error itself would keep all its data."""
     global _last
-    _last = text, [f"  {_place(frame)}" for frame in extract_tb(error.__traceback__)] if error is not None else []
-
-
-def _place(frame: FrameSummary) -> str:
-    """File, line and function of a call, without the folders of a user."""
-    return f"{'/'.join(Path(frame.filename).parts[-3:])}:{frame.lineno} in {frame.name}"
+    calls = [] if error is None else extract_tb(error.__traceback__)
+    # Without the folders of a user.
+    _last = text, [f"  {'/'.join(Path(one.filename).parts[-3:])}:{one.lineno} in {one.name}" for one in calls]
 
 
 def last_error() -> tuple[str, list[str]]:

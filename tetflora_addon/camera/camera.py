@@ -272,7 +272,9 @@ def blur_margins(camera: Camera, center: Floats, reach: Floats) -> tuple[float, 
     """
     if not len(center) or not (camera.lens_radius > 0.0 or camera.shutter):
         return 0.0, 0.0
-    depth = _depths(camera, center)
+    local = camera.to_camera_space(center)
+    # From the eye; distances where an image is all around it.
+    depth = np.linalg.norm(local, axis=-1) if camera.kind == "PANO" else local[..., 2] - camera.setback
     near, far = camera.near - camera.setback, camera.far - camera.setback
     nearest = np.maximum(depth - reach - camera.cell_radius, camera.closest)
     farthest = np.maximum(np.minimum(depth + reach + camera.cell_radius, far), camera.closest)
@@ -298,12 +300,6 @@ def circle_of_confusion(camera: Camera, depth: Floats) -> Floats:
     if camera.kind == "ORTHO":
         return camera.lens_radius * np.abs(depth / camera.focus - 1.0)
     return camera.lens_radius * np.abs(1.0 / np.maximum(depth, camera.closest) - 1.0 / camera.focus)
-
-
-def _depths(camera: Camera, points: Floats) -> Floats:
-    """Depths (n,) from the eye, meters, or distances where an image is all around it."""
-    local = camera.to_camera_space(points)
-    return np.linalg.norm(local, axis=-1) if camera.kind == "PANO" else local[..., 2] - camera.setback
 
 
 def _movement(camera: Camera, other: Camera, depths: tuple[float, float]) -> Floats:

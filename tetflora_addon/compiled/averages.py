@@ -22,17 +22,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays import Floats, Integers, Mask, Table, gathered
-from ..growth import seasons
+from ..growth import crown_effects, seasons
 from ..growth.axes import profile, profile_integral
-from ..growth.crown_effects import (
-    LIGHT,
-    are_stools,
-    bare_part,
-    dead_end,
-    lateral_fractions,
-    limb_count_factors,
-    trunk_length_factors,
-)
 from ..growth.foliage import YOUTH
 from ..growth.rows import DEAD, FORK, LATERAL, NOW, SPUR, fullness_of, lengths, living, spread_children
 from ..growth.seeds import BASE, LEAVES, MOST, WIDTH, Branches
@@ -349,7 +340,7 @@ class ShapedTotals:
         fewer[:, :, 2 * KINDS :] = 1.0 - np.sqrt(crown[:, LEAVES, None, None])
         power, borne = ((1 - part) * all_[row, low] + part * all_[row, low + 1] for all_ in (self.power, self.borne))
         power = power - fewer * borne
-        square = 1 + (crown[:, LIGHT][:, :2] ** 2).sum(axis=1) / 2
+        square = 1 + (crown[:, crown_effects.LIGHT][:, :2] ** 2).sum(axis=1) / 2
         width = crown[:, WIDTH]
         factors = np.stack([np.ones(len(row)), width, width**2 * square], axis=1)[:, :, None]
         plain = self.power[row, 0]
@@ -374,7 +365,7 @@ def shaped_totals(rows: Table, totals: Averages, polygons: Floats) -> ShapedTota
     every = np.arange(len(rows))
     bearing = (rows["next"][:, (LATERAL, DEAD, FORK)] >= 0).any(axis=1)
     solid = rows["phantom"] | rows["drawn"] | (rows["envelope"] > 0)
-    shaped = (rows["order"] == 0) & bearing & ~solid & ~are_stools(rows, every)
+    shaped = (rows["order"] == 0) & bearing & ~solid & ~crown_effects.are_stools(rows, every)
     power, borne = np.zeros((2, len(rows), len(_BASES), 3, _TOTALS))
     kinds = np.arange(KINDS) == rows["leaf_kind"][:, None]
     all_leaves = np.concatenate([totals.leaf_area[:, 1] @ kinds, (totals.leaves * polygons) @ kinds], axis=1)
@@ -386,7 +377,9 @@ def shaped_totals(rows: Table, totals: Averages, polygons: Floats) -> ShapedTota
         own[:, 0, _LEAF_FACES] += totals.leaves[i, i] * polygons[i] * kinds[i]
         own[:, 0, _FACES] += totals.fixed_faces[i, i]
         own[:, 0, _WOOD] += totals.fixed_wood[i, i]
-        below, above = trunk_length_factors(_BASES, rows["part"][np.argmax(rows["species"] == rows["species"][i]), 1])
+        below, above = crown_effects.trunk_length_factors(
+            _BASES, rows["part"][np.argmax(rows["species"] == rows["species"][i]), 1]
+        )
         stretch = above if rows["continues"][i] else below
         for sort in np.flatnonzero(rows["next"][i] >= 0):
             j = rows["next"][i, sort]
@@ -431,15 +424,15 @@ def _limbs(rows: Table, i: int, sort: int, base: float) -> tuple[float, ...]:
     """
     at, row = np.array([i]), rows[i]
     number = float(row["count"][sort, 0])
-    bare = float(bare_part(rows, at, base)[0])
-    among = lateral_fractions(rows, at, base)[0] if sort == LATERAL else row["fraction"][sort]
+    bare = float(crown_effects.bare_part(rows, at, base)[0])
+    among = crown_effects.lateral_fractions(rows, at, base)[0] if sort == LATERAL else row["fraction"][sort]
     weight, fading = 1.0, 1.0
     if row["growing"][sort, NOW] > 0:
         ends, plain = ((bare,), ()) if sort == LATERAL else ((0.0, bare), (0.0, 0.0))
         number *= living(row, sort, *ends) / max(living(row, sort, *plain), 1e-12)
         t, fraction, weight, fading = spread_children(row, sort, bare * (sort == LATERAL), bare * (sort == DEAD), among)
     elif sort == DEAD:
-        (start, end), last = row["start"][sort], float(dead_end(rows, at, base)[0])
+        (start, end), last = row["start"][sort], float(crown_effects.dead_end(rows, at, base)[0])
         number *= (last - start) / (end - start) if end > start else 1.0
         t, fraction = start + (last - start) * EVEN, among[0] + (among[1] - among[0]) * EVEN
     else:
@@ -449,7 +442,7 @@ def _limbs(rows: Table, i: int, sort: int, base: float) -> tuple[float, ...]:
         start = max(mean, bare)
         t, fraction = start + (1 - start) * EVEN, among[0] + (among[1] - among[0]) * EVEN
     if sort == LATERAL:
-        number *= float(limb_count_factors(rows, at, base)[0])
+        number *= float(crown_effects.limb_count_factors(rows, at, base)[0])
     vigor, _, size = side_branches(rows, i, sort, t, fraction, fading)
     # Numbers of a branch on which nothing follows the length: all but those of new branches.
     plain = rows[[row["next"][sort]]].copy()

@@ -17,17 +17,8 @@ from typing import Self
 import numpy as np
 
 from ..arrays import GOLDEN_ANGLE, Floats, Integers, Table, columns, cross, perpendicular, spiral
+from ..growth import foliage
 from ..growth.axes import Axes, axes
-from ..growth.foliage import (
-    axis_places,
-    leaf_frames,
-    leaf_keys,
-    leaf_lights,
-    leaf_places,
-    leaf_sizes,
-    outwardness,
-    settled,
-)
 from ..growth.growth import branch_counts, chosen_children, drawn_children, fullness, leaf_counts, radius_at
 from ..growth.hashing import Draw, key_of_seed, mix, thinned, uniform
 from ..growth.rows import DEAD, FORK, LATERAL, SPUR, ranged
@@ -96,7 +87,9 @@ def _evaluated(coefficients: Floats, row: Integers, frame: Floats, outward: Floa
         for weight, node in zip(quadratic(outward[chosen]).T, nodes, strict=True):
             local[chosen] += weight[:, None] * _product(basis[chosen], node)
     trace = local[:, :3].sum(axis=1, keepdims=True)
-    return _turned(local / np.where(trace > 0, trace, 1), frame)
+    # R M Rᵀ of symmetric M, given by six numbers each.
+    moments = (local / np.where(trace > 0, trace, 1))[:, [0, 3, 4, 3, 1, 5, 4, 5, 2]].reshape(-1, 3, 3)
+    return frame @ moments @ frame.transpose(0, 2, 1)
 
 
 def _basis(sky: Floats) -> Floats:
@@ -124,12 +117,6 @@ def _product(a: Floats, b: Floats) -> Floats:
     whole = len(a) // _PIECE * _PIECE
     pieces = np.ascontiguousarray(a[:whole]).reshape(-1, _PIECE, a.shape[1]) @ b
     return np.concatenate([pieces.reshape(whole, b.shape[1]), a[whole:] @ b])
-
-
-def _turned(six: Floats, frame: Floats) -> Floats:
-    """R M Rᵀ (n, 3, 3) of symmetric M given by six numbers (n, 6)."""
-    full = six[:, [0, 3, 4, 3, 1, 5, 4, 5, 2]].reshape(-1, 3, 3)
-    return frame @ full @ frame.transpose(0, 2, 1)
 
 
 def _frames_along(axis: Floats) -> Floats:
@@ -308,18 +295,18 @@ def _own_leaves(rows: Table, branches: Branches, lines: Axes, turn: Floats, plac
     index = (part * number).astype(np.int64)
     if rows["leaf_spray"][row[0]] > 0:  # one leaf after the other, so that both sides of the spray have as many
         index = (index - index % _LEAVES + each) % number
-    key = leaf_keys(branches, owner, index)
-    t = leaf_places(rows, branches, owner, index, counts, key)
+    key = foliage.leaf_keys(branches, owner, index)
+    t = foliage.leaf_places(rows, branches, owner, index, counts, key)
     roll = uniform(branches.key, Draw.ROLL)[owner]
     if rows["leaf_spray"][row[0]] == 0:
         # The first leaf stands anywhere around the branch, and so does any other: evenly, a good deal of chance goes.
         roll, index = roll + each / leaves, np.zeros_like(index)
-    _, along = lines.at(owner, axis_places(rows, branches, row, owner, t))
-    frame = leaf_frames(rows, row, along.astype(np.float32), roll, index, key)
-    outward = outwardness(rows, branches, owner, t)
-    light = leaf_lights(rows, row, key, outward if place is None else np.full(len(t), place))
-    frame = settled(rows, row, frame, light, _UP)
-    size = leaf_sizes(rows, row, key, outward, t)
+    _, along = lines.at(owner, foliage.axis_places(rows, branches, row, owner, t))
+    frame = foliage.leaf_frames(rows, row, along.astype(np.float32), roll, index, key)
+    outward = foliage.outwardness(rows, branches, owner, t)
+    light = foliage.leaf_lights(rows, row, key, outward if place is None else np.full(len(t), place))
+    frame = foliage.settled(rows, row, frame, light, _UP)
+    size = foliage.leaf_sizes(rows, row, key, outward, t)
     weight = number * (size * branches.scale[owner]) ** 2
     # F T Fᵀ, summed over the leaves of each branch: their frames side by side.
     left = _product(frame.reshape(-1, 3).astype(np.float64), turn).reshape(-1, 3, 3) * weight[:, None, None]

@@ -512,7 +512,8 @@ def _more(flora: Flora, plants: Branches, detail: LeafDetail) -> Floats:
     """Polygons and triangles (2,) of plants beyond those of the models of their species."""
     found = np.zeros(2)
     for whole in expand(flora, plants):
-        found += _finer_leaves(flora, whole, detail) + _finer_wood(flora, whole, detail) * np.array([1.0, 2.0])
+        wood = tube_faces(flora, whole, detail.wood) - tube_faces(flora, whole)
+        found += _finer_leaves(flora, whole, detail) + wood * np.array([1.0, 2.0])
     return found
 
 
@@ -527,7 +528,3 @@ def _finer_leaves(flora: Flora, whole: WholeBranches, detail: LeafDetail) -> Flo
         plain = np.mean([(f.polygons, f.triangles) for f in forms], axis=0)
         found += (np.mean(each, axis=0) - plain[:, None]) @ leaves[own]
     return found
-
-
-def _finer_wood(flora: Flora, whole: WholeBranches, detail: LeafDetail) -> float:
-    return tube_faces(flora, whole, detail.wood) - tube_faces(flora, whole)

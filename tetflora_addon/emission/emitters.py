@@ -14,18 +14,8 @@ from ..buffers import MeshBuffers, PointBuffers
 from ..camera.camera import Camera
 from ..compiled.flora import Flora
 from ..light.illumination import BakedLight, baked_attributes
+from ..proxies import primitives
 from ..proxies.microsurfaces import Facets
-from ..proxies.primitives import (
-    Primitive,
-    Spheres,
-    Triangles,
-    facet_mesh,
-    joined,
-    sphere_points,
-    spheres_of,
-    triangle_mesh,
-    triangles_of,
-)
 from ..refinement.lights import sun_of
 from ..refinement.loop import Refinement
 from .asset_plan import AssetPlan, OriginalPolicy, explicit_plan
@@ -132,9 +122,9 @@ class ProxyEmitter:
         return self.faces is None
 
 
-def as_triangles(facets: Facets, _seen: bool) -> Primitive:
+def as_triangles(facets: Facets, _seen: bool) -> primitives.Primitive:
     """The form of *Microsurfaces*."""
-    return triangles_of(facets)
+    return primitives.triangles_of(facets)
 
 
 @dataclass(frozen=True)
@@ -150,22 +140,24 @@ class AsSpheres:
     sun: Floats | None
     seen_too: bool
 
-    def __call__(self, facets: Facets, seen: bool) -> Primitive:
+    def __call__(self, facets: Facets, seen: bool) -> primitives.Primitive:
         """Spheres or triangles."""
         if seen and not self.seen_too:
-            return triangles_of(facets)
-        return spheres_of(facets, self.camera if seen else None, self.disc, self.sun)
+            return primitives.triangles_of(facets)
+        return primitives.spheres_of(facets, self.camera if seen else None, self.disc, self.sun)
 
 
 def facet_blocks(refined: EmissionInput) -> Iterator[Buffers]:
     """Facets as the form of the drawing has made them: triangles, spheres, or triangles where they are seen."""
     for parts in refined.facet_parts():
-        triangles = [some for some, _ in parts if isinstance(some, Triangles)]
-        spheres = [some for some, _ in parts if isinstance(some, Spheres)]
+        triangles = [some for some, _ in parts if isinstance(some, primitives.Triangles)]
+        spheres = [some for some, _ in parts if isinstance(some, primitives.Spheres)]
         if triangles:
-            yield replace(triangle_mesh(joined(triangles)), species=parts.species, look=parts.look)
+            yield replace(
+                primitives.triangle_mesh(primitives.joined(triangles)), species=parts.species, look=parts.look
+            )
         if spheres:
-            yield replace(sphere_points(joined(spheres)), species=parts.species, look=parts.look)
+            yield replace(primitives.sphere_points(primitives.joined(spheres)), species=parts.species, look=parts.look)
 
 
 def shell_blocks(
@@ -180,22 +172,22 @@ def shell_blocks(
 def _numbered(refined: EmissionInput, first_sheet: int) -> Iterator[tuple[Parts, Facets, Integers]]:
     """Blocks of facets, each as parts and as one, with the sheets (n,) that they are in baked light."""
     for parts in refined.facet_parts():
-        facets = joined([some for some, _ in parts])
+        facets = primitives.joined([some for some, _ in parts])
         yield parts, facets, np.arange(first_sheet, first_sheet + len(facets))
         first_sheet += len(facets)
 
 
 def _baked_facets(refined: EmissionInput, light: BakedLight, first_sheet: int) -> Iterator[MeshBuffers]:
     for parts, facets, sheets in _numbered(refined, first_sheet):
-        made, values = facet_mesh(facets), baked_attributes('FACE', *light.of_facets(facets, sheets))
+        made, values = primitives.facet_mesh(facets), baked_attributes('FACE', *light.of_facets(facets, sheets))
         yield replace(made, attributes={**made.attributes, **values}, species=parts.species, look=parts.look)
 
 
 def _baked_spheres(refined: EmissionInput, light: BakedLight, first_sheet: int) -> Iterator[PointBuffers]:
     camera, sun = refined.camera, sun_of(refined.refinement.lights)
     for parts, facets, sheets in _numbered(refined, first_sheet):
-        drawn = [spheres_of(some, camera if seen else None, refined.disc, sun) for some, seen in parts]
-        made, values = sphere_points(joined(drawn)), light.of_spheres(facets, sheets)
+        drawn = [primitives.spheres_of(some, camera if seen else None, refined.disc, sun) for some, seen in parts]
+        made, values = primitives.sphere_points(primitives.joined(drawn)), light.of_spheres(facets, sheets)
         baked = {name: array for name, (_, array) in baked_attributes('POINT', values).items()}
         yield replace(made, attributes={**made.attributes, **baked}, species=parts.species, look=parts.look)
 

@@ -195,11 +195,6 @@ def child_number(index: Integers, path: int) -> Integers:
     return np.where(index < 0, index + _NEGATIVE, index) + path if (index < 0).any() else index + path
 
 
-def _within(key: Keys) -> Floats:
-    """Where in their node the children of keys (n,) sit, 0 to 1."""
-    return 0.5 + 0.5 * signed(key, Draw.PLACE)
-
-
 @dataclass(frozen=True)
 class Grown:
     """Living nodes of branches (n,)."""
@@ -287,7 +282,8 @@ def grown_nodes(
     def passed(place: Floats, begin: int) -> Integers:
         node = np.floor(place)
         first = child_key(key, child_number((node * whorl).astype(np.int64), path + begin))
-        return node.astype(np.int64) + (_within(first) < place - node)
+        within = 0.5 + 0.5 * signed(first, Draw.PLACE)  # where in their node children sit, 0 to 1
+        return node.astype(np.int64) + (within < place - node)
 
     stay = [passed(np.where(place > 0, place * density[0], place), 0) for place in (ends[0], ends[2])]
     first, last = np.stack([stay, [passed(place * density[1], _EXTRA) for place in ends[1:]]], axis=1)

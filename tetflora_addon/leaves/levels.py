@@ -294,14 +294,9 @@ def _farthest(one: Floats, other: Floats) -> float:
     """Largest distance of points on edges (e, 2, 3) from others."""
     place = np.linspace(0.0, 1.0, _ON_EDGE)[:, None, None]
     points = (one[:, 0] + place * (one[:, 1] - one[:, 0])).reshape(-1, 3)
-    off = [
-        distance_to_links(part[:, None], other[None, :, 0], other[None, :, 1]).min(axis=1) for part in _parts(points)
-    ]
+    parts = np.array_split(points, len(points) // 256 + 1)
+    off = [distance_to_links(part[:, None], other[None, :, 0], other[None, :, 1]).min(axis=1) for part in parts]
     return float(np.concatenate(off).max())
-
-
-def _parts(points: Floats) -> list[Floats]:
-    return np.array_split(points, len(points) // 256 + 1)
 
 
 def _model_of(made: LeafSurface) -> LeafModel:

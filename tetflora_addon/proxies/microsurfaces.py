@@ -364,16 +364,12 @@ def _reach(area: Floats) -> Floats:
     return CIRCUMRADIUS * np.sqrt(area)
 
 
-def _on_axis(pieces: Pieces, owner: Integers, t: Floats) -> Floats:
-    """Places (m, 3) at fractions t (m,) of the branches that pieces (m,) are part of."""
-    part = (t - pieces.t0[owner]) / np.maximum(pieces.t1 - pieces.t0, 1e-12)[owner]
-    return pieces.start[owner] + part[:, None] * (pieces.end - pieces.start)[owner]
-
-
 def _wood_of_pieces(flora: Flora, pieces: Pieces, side: NDArray, weight: NDArray) -> Facets:
     none, wood = np.zeros(len(pieces)), wood_areas(flora, pieces) / 2
     owner, _, key, area, t = _along(flora, pieces, wood, side**2, none, _WOOD_PATH, _WOOD_COUNT)
-    center, axis = _on_axis(pieces, owner, t), unit(pieces.end - pieces.start)[owner]
+    part = (t - pieces.t0[owner]) / np.maximum(pieces.t1 - pieces.t0, 1e-12)[owner]
+    span = (pieces.end - pieces.start)[owner]
+    center, axis = pieces.start[owner] + part[:, None] * span, unit(span)
     color = flora.rows["branch_color"][pieces.branches.row[owner], 0]
     velocity = None
     if pieces.branches.later is not None:

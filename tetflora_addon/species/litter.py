@@ -123,7 +123,8 @@ def branch_page(species: Species, page: Mapping[str, Any]) -> dict[str, Any] | N
     if species.orders[0].length.mean < _TREE or len(species.orders) < 3:
         return None
     length = min(max(0.22 * species.orders[0].length.mean * min(species.orders[1].length.mean, 1.0), 0.7), 2.2)
-    orders = [_bare(order) for order in page["orders"][1:4]]
+    # Without leaves, short shoots, forks and whatever else grows on them but branches.
+    orders = [{key: value for key, value in order.items() if key in _KEPT} for order in page["orders"][1:4]]
     for order in orders:
         # Twigs of a branch that fell spread over the ground, and many are gone.
         order |= _parts()["twig"]
@@ -178,11 +179,6 @@ def _page(species: Species, kind: str, description: str, orders: list[dict[str, 
     name, transmission = f"{species.name} {kind}"[:1000], species.leaf_transmission
     page = {"format": FORMATS["species"], "name": name, "description": description[:1000], "bark": species.bark}
     return page | {"leaf": [], "leaf_transmission": transmission, "orders": orders}
-
-
-def _bare(order: Mapping[str, Any]) -> dict[str, Any]:
-    """An order of a page without leaves, short shoots, forks and whatever else grows on it but branches."""
-    return {key: value for key, value in order.items() if key in _KEPT}
 
 
 def _fewer(value: Any, most: float) -> tuple[float, float]:

@@ -152,7 +152,8 @@ class Plants(Arrays):
         identity = self.number, np.full(len(self), year), self.species, uniform(self.key, StandDraw.SEED) * 2.0**31
         crown = diameter, 2.0 * self.radius, self.base, offset
         upright = np.zeros((len(self), 2)), np.zeros(len(self))
-        return Records.typed(*identity, _positions(self.x, self.y, site), self.height, *crown, *upright)
+        place = np.stack([site.west + self.x, site.south + self.y, site.ground(self.x, self.y)], axis=1)
+        return Records.typed(*identity, place.astype(np.float32), self.height, *crown, *upright)
 
 
 @dataclass(frozen=True)
@@ -172,10 +173,6 @@ class DeadPlants(Arrays):
         lean = np.where((year > self.falls)[:, None], self.lean, np.float32(0.0))
         dead = (year - self.died).astype(np.float32)
         return replace(last, year=np.full(len(last), year, np.float32), lean=lean, dead=dead)
-
-
-def _positions(x: NDArray, y: NDArray, site: StandSite) -> Floats32:
-    return np.stack([site.west + x, site.south + y, site.ground(x, y)], axis=1).astype(np.float32)
 
 
 def newcomers(

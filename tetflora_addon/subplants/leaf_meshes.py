@@ -18,17 +18,7 @@ from numpy.typing import NDArray
 from ..arrays import Floats, Floats32, Integers, Integers32, Keys, chunks, gathered, spread
 from ..buffers import MeshBuffers
 from ..compiled.flora import Flora
-from ..growth.foliage import (
-    in_wind,
-    leaf_forms,
-    leaf_keys,
-    leaf_places,
-    outwardness,
-    place_leaves,
-    settled,
-    stages_of,
-    youth,
-)
+from ..growth import foliage
 from ..growth.growth import WholeBranches, leaf_counts
 from ..growth.hashing import Draw, uniform
 from ..growth.seasons import is_seasonal, leaf_colors
@@ -394,23 +384,27 @@ class _LeafBearers:
         """Place all leaves of one of the forms that are worth it."""
         rows, vertices = self.flora.rows, len(copies.model.positions)
         for bearers, counts, owner, index, key in self._runs(form, vertices):
-            t, larger = leaf_places(rows, bearers.branches, owner, index, counts, key), None
-            leaves = place_leaves(rows, bearers.branches, bearers.lines, owner, index, key, t)
-            frame = in_wind(
-                rows, bearers.branches, leaves, settled(rows, self.row, leaves.frame, leaves.light, leaves.sky)
+            t, larger = foliage.leaf_places(rows, bearers.branches, owner, index, counts, key), None
+            leaves = foliage.place_leaves(rows, bearers.branches, bearers.lines, owner, index, key, t)
+            frame = foliage.in_wind(
+                rows, bearers.branches, leaves, foliage.settled(rows, self.row, leaves.frame, leaves.light, leaves.sky)
             )
             if thin is not None and not rows["envelope"][self.row[0]]:
                 kept, times = thin(key, *copies.spheres(leaves.position, frame, leaves.size))
                 owner, index, key, t, frame = (gathered(of, kept) for of in (owner, index, key, t, frame))
                 leaves, larger = leaves.take(kept), np.sqrt(times)
             gradient = rows["gradient"][self.row[0]]
-            places = (outwardness(rows, bearers.branches, owner, t), youth(rows, self.row, t)) if gradient else ()
+            places = (
+                (foliage.outwardness(rows, bearers.branches, owner, t), foliage.youth(rows, self.row, t))
+                if gradient
+                else ()
+            )
             motion = None
             if bearers.lines.later is not None:
                 branches, seconds = bearers.branches.moved(), moment(rows)
-                again = place_leaves(rows, branches, bearers.lines.later, owner, index, key, t)
-                turned = settled(rows, self.row, again.frame, again.light, again.sky)
-                turned = in_wind(rows, branches, again, turned, seconds)
+                again = foliage.place_leaves(rows, branches, bearers.lines.later, owner, index, key, t)
+                turned = foliage.settled(rows, self.row, again.frame, again.light, again.sky)
+                turned = foliage.in_wind(rows, branches, again, turned, seconds)
                 motion = (again.position - leaves.position) / seconds, (turned - frame) / np.float32(seconds)
             if leaves.stages is not None:
                 places = (*(places or (None, None)), leaves.stages, np.take(bearers.branches.year[:, 1], owner))
@@ -442,7 +436,7 @@ class _LeafBearers:
     def _leaves(self, part: slice) -> tuple[Integers, ...]:
         """Branch within the run, number on it, key and form of each wanted leaf."""
         owner, index = spread(self.counts[part])
-        key = leaf_keys(self.whole.branches.take(part), owner, index)
+        key = foliage.leaf_keys(self.whole.branches.take(part), owner, index)
         kept = np.ones(len(key), bool)
         if self.fraction is not None:
             wanted, low, high = self.fraction[part], self.low[part], self.high[part]
@@ -451,12 +445,12 @@ class _LeafBearers:
             if (low > 0.0).any() or (high < 1.0).any():
                 number = uniform(key, Draw.LEAF_KITE)
                 kept &= (low[owner] <= number) & (number < high[owner])
-        form = leaf_forms(len(self.forms), key) if len(self.forms) > 1 else np.zeros(len(key), np.int64)
+        form = foliage.leaf_forms(len(self.forms), key) if len(self.forms) > 1 else np.zeros(len(key), np.int64)
         if self.lengths is not None:
             length = self.lengths[part][owner] * (_EARLIEST + (1.0 - _EARLIEST) * uniform(key, Draw.LEAF_LEVEL))
             for number, model in enumerate(self.forms):
                 kept &= (form != number) | (chosen_level(model, length) == self.step)
-        stages = stages_of(self.flora.rows, self.whole.branches.take(part), owner, key)
+        stages = foliage.stages_of(self.flora.rows, self.whole.branches.take(part), owner, key)
         if stages is not None:
             kept &= stages.there
         if kept.all():

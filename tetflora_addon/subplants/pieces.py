@@ -13,10 +13,7 @@ import numpy as np
 from ..arrays import Arrays, Floats, Integers, Keys, Table, column, gathered, nested
 from ..compiled.averages import own_leaf_integrals, tube_perimeter
 from ..compiled.flora import Flora
-from ..growth.axes import profile_integral
-from ..growth.foliage import leaf_start, outwardness
-from ..growth.growth import WholeBranches, open_branches
-from ..growth.seeds import Branches
+from ..growth import axes, foliage, growth, seeds
 
 #: What of leaves or facets is worth making, before it is made. Given keys (m,), middles (m, 3) and radii (m,), meters:
 #: which (k,) are made, and how many times as large the area (k,) of each is.
@@ -28,7 +25,7 @@ class Pieces(Arrays):
     """Parts of branches, each within one straight segment."""
 
     #: of n: the whole branch that each piece is part of; enough to make its wood and leaves.
-    branches: Branches = nested(Branches)
+    branches: seeds.Branches = nested(seeds.Branches)
     #: t0 and t1, (n,): the part's ends as fractions of the branch's axis.
     t0: Floats
     t1: Floats
@@ -37,7 +34,7 @@ class Pieces(Arrays):
     end: Floats = column(3)
 
 
-def whole_pieces(rows: Table, whole: WholeBranches) -> tuple[Pieces, Integers]:
+def whole_pieces(rows: Table, whole: growth.WholeBranches) -> tuple[Pieces, Integers]:
     """All segments (m,) of whole branches as pieces, and the branch (m,) of each."""
     owner, t, position = whole.knots(rows)
     low = np.flatnonzero(owner[1:] == owner[:-1])
@@ -48,16 +45,16 @@ def whole_pieces(rows: Table, whole: WholeBranches) -> tuple[Pieces, Integers]:
 
 def leaf_fraction(flora: Flora, pieces: Pieces) -> Floats:
     """Expected fraction (n,) of a branch's own leaves that sit on each piece."""
-    start = leaf_start(flora.rows, pieces.branches)
+    start = foliage.leaf_start(flora.rows, pieces.branches)
     return np.clip(np.maximum(pieces.t1, start) - np.maximum(pieces.t0, start), 0, None) / (1 - start)
 
 
 def outward_ends(flora: Flora, pieces: Pieces) -> tuple[Floats, Floats]:
     """Places between inside and outside of the crown of the first and the last leaf that each piece (n,) may bear."""
     rows, branches = flora.rows, pieces.branches
-    start = leaf_start(rows, branches)
+    start = foliage.leaf_start(rows, branches)
     every = np.arange(len(pieces))
-    return tuple(outwardness(rows, branches, every, np.maximum(t, start)) for t in (pieces.t0, pieces.t1))
+    return tuple(foliage.outwardness(rows, branches, every, np.maximum(t, start)) for t in (pieces.t0, pieces.t1))
 
 
 def piece_leaf_integrals(flora: Flora, pieces: Pieces) -> tuple[Floats, Floats, Floats]:
@@ -65,7 +62,7 @@ def piece_leaf_integrals(flora: Flora, pieces: Pieces) -> tuple[Floats, Floats, 
     rows, row = flora.rows, pieces.branches.row
     along = None
     if flora.has_young:
-        start, (first, last) = leaf_start(rows, pieces.branches), rows["part"][row].T
+        start, (first, last) = foliage.leaf_start(rows, pieces.branches), rows["part"][row].T
         along = tuple(first + (last - first) * np.maximum(t, start) for t in (pieces.t0, pieces.t1))
     sizes = rows["leaf_size_tip"][row], rows["leaf_size_young"][row]
     return own_leaf_integrals(*sizes, outward_ends(flora, pieces), along)
@@ -91,11 +88,11 @@ def _summer_colors(flora: Flora, pieces: Pieces) -> Floats:
 def wood_areas(flora: Flora, pieces: Pieces) -> Floats:
     """Surface (n,) of the wood of each piece, m²: perimeter × length at the mean radius."""
     branches = pieces.branches
-    low, high = (profile_integral(flora.rows, branches.row, branches.key, t) for t in (pieces.t0, pieces.t1))
+    low, high = (axes.profile_integral(flora.rows, branches.row, branches.key, t) for t in (pieces.t0, pieces.t1))
     return tube_perimeter(flora.rows["sides"][branches.row]) * branches.radius * branches.length * (high - low)
 
 
-def open_subplants(flora: Flora, subplants: Branches) -> tuple[Branches, Integers, Pieces, Integers]:
+def open_subplants(flora: Flora, subplants: seeds.Branches) -> tuple[seeds.Branches, Integers, Pieces, Integers]:
     """Open sub-plants into the sub-plants of the next order and the pieces of their own branch.
 
     Returns
@@ -103,12 +100,12 @@ def open_subplants(flora: Flora, subplants: Branches) -> tuple[Branches, Integer
     Branches, (m,) int64, Pieces, (k,) int64
         Children with the index of the sub-plant that each comes from, and pieces with theirs.
     """
-    whole, body, grown, owner = open_branches(flora.rows, subplants)
+    whole, body, grown, owner = growth.open_branches(flora.rows, subplants)
     pieces, piece_owner = whole_pieces(flora.rows, whole)
     return grown, body[owner], pieces, body[piece_owner]
 
 
-def expand(flora: Flora, subplants: Branches) -> Iterator[WholeBranches]:
+def expand(flora: Flora, subplants: seeds.Branches) -> Iterator[growth.WholeBranches]:
     """All branches of sub-plants, to the last twig, order by order.
 
     Notes
@@ -116,5 +113,5 @@ def expand(flora: Flora, subplants: Branches) -> Iterator[WholeBranches]:
     Memory grows with the number of branches; split the sub-plants with `chunks` where there are many.
     """
     while len(subplants):
-        whole, _, subplants, _ = open_branches(flora.rows, subplants)
+        whole, _, subplants, _ = growth.open_branches(flora.rows, subplants)
         yield whole

@@ -60,7 +60,7 @@ def test_leaves_of_many_corners_need_more_memory(monkeypatch) -> None:
     monkeypatch.setattr(refine, "expanded_blocks", lambda *_: iter(()))
     scene.tetflora.expand_everything = True
     for gigabytes, fits in ((4.0, False), (8.0, True)):
-        monkeypatch.setattr(refine, "memory_left", lambda *_, left=gigabytes * 1e9: left)
+        monkeypatch.setattr(contents, "memory_left", lambda *_, left=gigabytes * 1e9: left)
         with (
             nullcontext() if fits else pytest.raises(errors.SceneError, match=r"2\.5 million polygons, which take 5\.0")
         ):

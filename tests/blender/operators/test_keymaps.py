@@ -18,8 +18,7 @@ import panels
 from devtools import build
 from devtools.layouts import Layout
 from panels.layers import TETFLORA_MT_layers
-from panels.menus import TETFLORA_MT_object, draw_in_add_menu
-from panels.places import draw_in_import_menu
+from panels.menus import TETFLORA_MT_object, draw_in_add_menu, draw_in_import_menu
 from panels.preferences import KEYMAP, KEYS
 from tests.blender.scenes import add_camera, add_plant
 from tetflora_addon.blender import preferences, properties, translations

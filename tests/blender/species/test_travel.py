@@ -12,7 +12,8 @@ import pytest
 
 from tests.blender.scenes import add_camera, add_plant, depsgraph
 from tetflora_addon.blender.job import refine
-from tetflora_addon.blender.placing.plant_objects import link_field, write_field
+from tetflora_addon.blender.placing.plant_objects import link_field
+from tetflora_addon.blender.scene.fields import write_field
 from tetflora_addon.blender.scene.plants import read_plants
 from tetflora_addon.blender.species.edits import (
     catalog,

@@ -68,11 +68,11 @@ def test_in_the_background_nothing_is_drawn():
     try:
         bpy.context.window_manager.tetflora_points = True
         assert bpy.app.background
-        assert points.shown_in(bpy.context.scene)
+        assert points.switch.shown_in(bpy.context.scene)
         assert points._state.handle is None
-        assert not bpy.app.timers.is_registered(points._on_timer)
+        assert not bpy.app.timers.is_registered(points.switch.refresh)
     finally:
-        points.show(bpy.context.scene, False)
+        points.switch.show(bpy.context.scene, False)
     assert points._state.handle is None
 
 

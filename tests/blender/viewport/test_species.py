@@ -20,9 +20,7 @@ pytestmark = pytest.mark.usefixtures("clean_file")
 def preview():
     """Timers never fire here, so that the tests do what they would do."""
     yield species
-    species.show(bpy.context.scene, False)
-    if bpy.app.timers.is_registered(species.refresh):
-        bpy.app.timers.unregister(species.refresh)
+    species.switch.forget()
 
 
 def _toggle():
@@ -34,7 +32,7 @@ def _switch_on(preview, species="bush"):
     editor = bpy.context.scene.tetflora.species_editor
     editor.species = species
     _toggle()
-    preview.refresh()
+    preview.switch.refresh()
     return editor
 
 
@@ -67,18 +65,18 @@ def test_follows_changes_and_keeps_the_last_sound_plant(preview):
         lambda: setattr(editor, "species_choice", "conifer"),
         bpy.ops.tetflora.duplicate_species,
     ):
-        if timers.is_registered(preview.refresh):
-            timers.unregister(preview.refresh)
+        if timers.is_registered(preview.switch.refresh):
+            timers.unregister(preview.switch.refresh)
         change()
-        assert timers.is_registered(preview.refresh)
-    preview.refresh()
+        assert timers.is_registered(preview.switch.refresh)
+    preview.switch.refresh()
     (shown,) = _objects()
     assert shown.name == name
     after = len(shown.data.polygons)
     assert after != before
     editor.order_index = 1
     editor.length[1] = 15.0
-    preview.refresh()
+    preview.switch.refresh()
     assert len(_objects()[0].data.polygons) == after
     message, failed = preview.message()
     assert failed
@@ -112,7 +110,7 @@ def test_is_not_saved(preview, tmp_path):
     assert len(_objects()) == 1
     bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "a.blend"))
     assert (datablocks()["objects"], datablocks()["meshes"], datablocks()["collections"]) == ([], [], [])
-    assert not preview.shown_in(bpy.context.scene)
+    assert not preview.switch.shown_in(bpy.context.scene)
 
 
 def test_not_saved_after_undo_either(preview, tmp_path):
@@ -121,7 +119,7 @@ def test_not_saved_after_undo_either(preview, tmp_path):
     editor.length[0] = 0.3
     bpy.ops.ed.undo_push(message="slider")
     bpy.ops.ed.undo()
-    preview.refresh()
+    preview.switch.refresh()
     assert len(_objects()) == 1
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "a.blend"))
     bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "a.blend"))
@@ -141,8 +139,8 @@ def test_undo_and_redo_meet_no_preview_that_changed_since(preview):
             bpy.ops.ed.undo_push(message=f"order {order}")
         for step in (bpy.ops.ed.undo, bpy.ops.ed.undo, bpy.ops.ed.redo, bpy.ops.ed.redo):
             step()
-            assert preview.shown_in(bpy.context.scene)
-            preview.refresh()
+            assert preview.switch.shown_in(bpy.context.scene)
+            preview.switch.refresh()
             bpy.context.view_layer.update()
             assert len(_objects()) == 1
     finally:
@@ -159,7 +157,7 @@ def test_undo_brings_no_preview_back_that_was_switched_off(preview):
     assert _objects() == []
     bpy.ops.ed.undo_push(message="without")
     bpy.ops.ed.undo()
-    preview.refresh()
+    preview.switch.refresh()
     assert _objects() == []
     assert not bpy.data.collections
 
@@ -176,16 +174,16 @@ def test_leaves_nothing_of_itself(preview):
 def test_loading_another_file_ends_it(preview):
     _switch_on(preview)
     session.clean_file()
-    assert not preview.shown_in(bpy.context.scene)
-    preview.refresh()
+    assert not preview.switch.shown_in(bpy.context.scene)
+    preview.switch.refresh()
     assert _objects() == []
 
 
 def test_previews_stay_with_a_scene_that_is_renamed(clean_file):
     scene, other = bpy.context.scene, bpy.data.scenes.new("other")
     for preview in (species, points):
-        preview.show(scene, True)
+        preview.switch.show(scene, True)
         scene.name, other.name = "renamed", "Scene"
-        assert preview.shown_in(scene) and not preview.shown_in(other)
-        preview.show(scene, False)
+        assert preview.switch.shown_in(scene) and not preview.switch.shown_in(other)
+        preview.switch.show(scene, False)
         other.name, scene.name = "other", "Scene"

@@ -20,15 +20,11 @@ from typing import Any
 import bpy
 
 from ...errors import VALUE, SceneError, TetFloraError, readable
-from ..compat import EEVEE_ENGINES, eevee_engine
+from .. import compat, properties, runtime, saved_files, worker
 from ..export.forest import LEVELS, MOST_VARIANTS, WRITERS, ExportOrder, export_steps
 from ..job.contents import estimate
 from ..job.refine import refine
-from ..properties import TetFloraScene
-from ..runtime import failed_frames
-from ..saved_files import damaged, write_blend
 from ..scene.camera import read_camera
-from ..worker import run_to_end
 
 #: First, last and step of frames.
 Run = tuple[int, int, int]
@@ -206,7 +202,7 @@ def _refine(options: argparse.Namespace) -> dict:
     statistics = refine(scene, bpy.context.evaluated_depsgraph_get())
     if target is not None:
         scene.tetflora.output.save_results = True
-        write_blend(target, lambda path: bpy.ops.wm.save_as_mainfile(filepath=path, copy=True))
+        saved_files.write_blend(target, lambda path: bpy.ops.wm.save_as_mainfile(filepath=path, copy=True))
     if statistics.unknown:
         raise SceneError(statistics.unknown)
     return asdict(statistics)
@@ -219,9 +215,9 @@ def _render(options: argparse.Namespace) -> dict | None:
     scene.tetflora.refine_at_render = True
     _set_proxies(scene, options)
     if options.engine is not None:
-        scene.render.engine = 'CYCLES' if options.engine == "cycles" else eevee_engine()
+        scene.render.engine = 'CYCLES' if options.engine == "cycles" else compat.eevee_engine()
     if options.samples is not None:
-        if scene.render.engine in EEVEE_ENGINES:
+        if scene.render.engine in compat.EEVEE_ENGINES:
             scene.eevee.taa_render_samples = options.samples
         elif scene.render.engine == 'CYCLES':
             scene.cycles.samples = options.samples
@@ -244,7 +240,7 @@ def _render(options: argparse.Namespace) -> dict | None:
         name, whole = _still(scene, _still_path(scene))
         files = [name]
     paths = [Path(bpy.path.abspath(f)) for f in files]
-    for path in damaged(scene, paths):
+    for path in saved_files.damaged(scene, paths):
         raise SceneError(f"{path} is incomplete; check the free disk space")
     if not whole:
         return None  # reported on stderr before
@@ -260,7 +256,7 @@ def _export(options: argparse.Namespace) -> dict:
     if options.variants > MOST_VARIANTS or options.levels > LEVELS:
         raise SceneError(f"There are at most {MOST_VARIANTS:,} variants and {LEVELS} levels; give a smaller number")
     order = ExportOrder(_named(options.path), options.variants, options.levels, options.polygons, not options.flat)
-    found = run_to_end(export_steps(bpy.context.scene, bpy.context.evaluated_depsgraph_get(), order))
+    found = worker.run_to_end(export_steps(bpy.context.scene, bpy.context.evaluated_depsgraph_get(), order))
     return asdict(found) | {"path": str(found.path)}
 
 
@@ -293,7 +289,7 @@ def _animation(scene: bpy.types.Scene, run: Run) -> tuple[list[str], bool]:
     if first <= last:
         scene.frame_start, scene.frame_end, scene.frame_step = first, last, step
         bpy.ops.render.render(animation=True)
-        whole = whole and not failed_frames
+        whole = whole and not runtime.failed_frames
         names = [scene.render.frame_path(frame=n) for n in frame_numbers([(first, last, step)])]
         files += dict.fromkeys(names)  # all of a movie are one
     return files, whole
@@ -304,7 +300,7 @@ def _still(scene: bpy.types.Scene, path: str) -> tuple[str, bool]:
     before, scene.render.filepath = scene.render.filepath, path
     bpy.ops.render.render(write_still=True)
     scene.render.filepath = before
-    return bpy.path.ensure_ext(path, scene.render.file_extension), not failed_frames
+    return bpy.path.ensure_ext(path, scene.render.file_extension), not runtime.failed_frames
 
 
 def _named(text: str) -> Path:
@@ -333,7 +329,7 @@ def _set_proxies(scene: bpy.types.Scene, options: argparse.Namespace) -> None:
 
 
 def _choices(name: str) -> list[str]:
-    return [item.identifier.lower() for item in TetFloraScene.bl_rna.properties[name].enum_items]
+    return [item.identifier.lower() for item in properties.TetFloraScene.bl_rna.properties[name].enum_items]
 
 
 def positive(text: str) -> float:

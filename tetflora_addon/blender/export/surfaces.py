@@ -15,21 +15,8 @@ import numpy as np
 
 from ...arrays import Floats, Floats32
 from ...buffers import MeshBuffers
+from ...export import images
 from ...export.forest import BakedSurface, Variant, identifiers, leaf_roughness
-from ...export.images import (
-    LEAVES,
-    TEXELS,
-    WOOD,
-    Palette,
-    atlas,
-    halved,
-    in_atlas,
-    outline,
-    palette_of,
-    png,
-    tiled,
-    within,
-)
 from ...export.levels import corner_triangles
 from ...export.opaque import Sides, opaque, sides_of
 from ...jobs import Job, Progress
@@ -52,7 +39,7 @@ class _Look:
     species: str
     part: str
     meshes: tuple[MeshBuffers, ...]
-    palette: Palette
+    palette: images.Palette
 
     @property
     def color(self) -> np.ndarray:
@@ -89,7 +76,7 @@ def with_surfaces(
     made = []
     for variant in variants:
         own = {part: palette for (species, part), palette in palettes.items() if species == variant.species}
-        levels = tuple(in_atlas(level, own) for level in variant.levels)
+        levels = tuple(images.in_atlas(level, own) for level in variant.levels)
         made.append(replace(variant, levels=levels, surfaces={part: found[variant.species, part] for part in own}))
     return tuple(made)
 
@@ -111,7 +98,13 @@ def _looks(variants: Sequence[Variant]) -> list[_Look]:
                 parts.setdefault((variant.species, part), []).append(mesh)
     names = identifiers([f"{species}_{part}" for species, part in parts])
     return [
-        _Look(name, species, part, tuple(meshes), palette_of(meshes, WOOD if part == "bark" else LEAVES))
+        _Look(
+            name,
+            species,
+            part,
+            tuple(meshes),
+            images.palette_of(meshes, images.WOOD if part == "bark" else images.LEAVES),
+        )
         for name, ((species, part), meshes) in zip(names, parts.items(), strict=True)
     ]
 
@@ -120,34 +113,34 @@ def _surface(scene: bpy.types.Scene, look: _Look, folder: Path, textures: str, b
     is_bark = look.part == "bark"
     gloss = 0.0 if is_bark else GLOSS * (1.0 - look.mean("tf_dull"))
     rough = _BARK if is_bark else leaf_roughness(gloss)
-    images: dict[str, Floats32] = {}
+    maps: dict[str, Floats32] = {}
     if bake:
         species = species_for(scene, look.species)
         material = materials_of(scene, species, look.part, 0)[0]
         low = look.palette.low + np.array([0.0, _ABOVE * is_bark])
         given = (low, look.palette.size, 1.0 if is_bark else _meters(look.meshes[0]))
-        images = baked(material, look.color, look.mean("tf_transmission"), TEXELS, *given)
-        images = {name: tiled(own) if is_bark else within(own) for name, own in images.items()}
+        maps = baked(material, look.color, look.mean("tf_transmission"), images.TEXELS, *given)
+        maps = {name: images.tiled(own) if is_bark else images.within(own) for name, own in maps.items()}
         if is_bark or not is_ours(material):
-            rough = float(images["roughness"].mean())
-        if np.ptp(images["roughness"]) < _EVEN:  # as of TetFlora's own materials
-            del images["roughness"]
-        if images["normal"][..., :2].std() < _EVEN:
-            del images["normal"]
-    detail = images.get("color", np.ones((TEXELS, TEXELS, 3), np.float32))
-    shown = None if is_bark else np.any([outline(look.palette, mesh) for mesh in look.meshes], axis=0)
+            rough = float(maps["roughness"].mean())
+        if np.ptp(maps["roughness"]) < _EVEN:  # as of TetFlora's own materials
+            del maps["roughness"]
+        if maps["normal"][..., :2].std() < _EVEN:
+            del maps["normal"]
+    detail = maps.get("color", np.ones((images.TEXELS, images.TEXELS, 3), np.float32))
+    shown = None if is_bark else np.any([images.outline(look.palette, mesh) for mesh in look.meshes], axis=0)
     seen = detail.reshape(-1, 3) if shown is None else detail[shown]
     detail = detail / np.maximum(seen.mean(axis=0), 1e-6)
     # Not as alpha of colors, which EEVEE multiplies by it: outlines are for cards, and polygons need none.
-    images |= {} if shown is None else {"opacity": shown[..., None].astype(np.float32)}
-    files = {key: np.tile(texels, (*look.palette.grid[::-1], 1)) for key, texels in images.items()}
-    files["color"] = atlas(look.palette, detail)
+    maps |= {} if shown is None else {"opacity": shown[..., None].astype(np.float32)}
+    files = {key: np.tile(texels, (*look.palette.grid[::-1], 1)) for key, texels in maps.items()}
+    files["color"] = images.atlas(look.palette, detail)
     names = {}
     for key, texels in files.items():
         names[key] = f"{textures}/{look.name}_{key}.png"
         (folder / textures).mkdir(exist_ok=True)
-        (folder / names[key]).write_bytes(png(texels, linear=key != "color"))
-        half = png(halved(texels), linear=key != "color")
+        (folder / names[key]).write_bytes(images.png(texels, linear=key != "color"))
+        half = images.png(images.halved(texels), linear=key != "color")
         (folder / textures / f"{look.name}_{key}_half.png").write_bytes(half)
     names.pop("opacity", None)
     color = tuple(look.color.tolist())

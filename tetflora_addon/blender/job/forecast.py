@@ -22,7 +22,7 @@ from ...growth.seasons import PRESENT, expected_of
 from ...processes import pool
 from ...species.kinds import species_of
 from ..attributes import read, values_of
-from ..runtime import Handlers, Outlook
+from ..runtime import Handlers, Outlook, in_order
 from ..scene.ages import crown_kinds
 from ..scene.camera import read_camera
 from ..scene.crowns import crown_to_draw
@@ -57,7 +57,10 @@ def forecast(scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer) -> Estimat
     depsgraph = view_layer.depsgraph
     if depsgraph is None or scene.camera is None:
         return None
-    stand = _stand_of(scene, view_layer)
+    layer = scene.session_uid, view_layer.name
+    if _counted.stand is None or _counted.layer != layer or _counted.stale:
+        _counted.stand, _counted.layer, _counted.stale = _count(scene, view_layer), layer, False
+    stand = _counted.stand
     if stand is None or not len(stand.number):
         return None
     try:
@@ -120,13 +123,6 @@ def polygons_text(number: float) -> str:
     if number >= _MEGA:
         return f"{number / _MEGA:.2g} M polygons" if number < 10.0 * _MEGA else f"{number / _MEGA:,.0f} M polygons"
     return f"{float(f'{number:.2g}'):,.0f} polygons"
-
-
-def _stand_of(scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer) -> Stand | None:
-    layer = scene.session_uid, view_layer.name
-    if _counted.stand is None or _counted.layer != layer or _counted.stale:
-        _counted.stand, _counted.layer, _counted.stale = _count(scene, view_layer), layer, False
-    return _counted.stand
 
 
 def _count(scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer) -> Stand | None:
@@ -259,13 +255,4 @@ _HANDLERS = Handlers(depsgraph_update_post=_on_change, undo_post=_on_change, red
 _outlook = Outlook(_text_for, old=2.0)
 
 
-def register() -> None:
-    """Count and forecast from now on."""
-    _HANDLERS.register()
-    _outlook.register()
-
-
-def unregister() -> None:
-    """Do so no more."""
-    _outlook.unregister()
-    _HANDLERS.unregister()
+register, unregister = in_order(_HANDLERS, _outlook)

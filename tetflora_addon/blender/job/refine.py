@@ -54,20 +54,7 @@ from ..runtime import JobData, guarded
 from ..scene.camera import read_camera
 from ..scene.objects import taking_part
 from ..worker import call_in_thread, nobody_waits, run_to_end, steps_in_thread, written
-from .contents import (
-    SceneAssets,
-    SceneContents,
-    asset_warnings,
-    bind_steps,
-    check_expanded,
-    in_wind,
-    is_plain,
-    load_for,
-    memory_left,
-    read_scene,
-    refinement_settings,
-    use_machine,
-)
+from . import contents
 
 #: Clusters of which meshes are made between two looks at the window.
 _BATCH = 16
@@ -87,12 +74,12 @@ class _Run:
 
     depsgraph: bpy.types.Depsgraph
     camera: Camera | None = None
-    given: SceneContents | None = None
+    given: contents.SceneContents | None = None
     data: JobData | None = None
     results: Results | None = None
     beside: Sequence[bpy.types.Collection] = ()
     flora: Flora | None = None
-    bound: SceneAssets | None = None
+    bound: contents.SceneAssets | None = None
     settings: RefinementSettings | None = None
     originals: list[bpy.types.Object] = field(default_factory=list)
     statistics: Statistics = field(default_factory=Statistics)
@@ -101,7 +88,7 @@ class _Run:
     baking: Baking | None = None
 
 
-def left_alone(bound: SceneAssets, plan: AssetPlan) -> Mask:
+def left_alone(bound: contents.SceneAssets, plan: AssetPlan) -> Mask:
     """Owners (k,) of which every instance is the original: they go on showing them themselves."""
     whole = np.zeros(len(bound.placed), bool)
     whole[plan.originals] = True
@@ -160,7 +147,7 @@ def write_assets(run: _Run, plan: AssetPlan) -> Job[None]:
 
 
 def _groups(
-    bound: SceneAssets, asset: Integers32, owner: Integers32
+    bound: contents.SceneAssets, asset: Integers32, owner: Integers32
 ) -> Iterator[tuple[Target, bpy.types.Object | None, Integers]]:
     """Rows (k,) of the same asset and the same owner each."""
     for pair in np.unique(asset.astype(np.int64) * len(bound.owners) + owner).tolist():
@@ -323,7 +310,7 @@ def refine_steps(
     for_render: bool = False,
     beside: Sequence[bpy.types.Collection] = (),
     camera: Camera | None = None,
-    given: SceneContents | None = None,
+    given: contents.SceneContents | None = None,
     mark: str = "",
     first_look: bool = False,
 ) -> Job[Statistics]:
@@ -368,12 +355,12 @@ def refine_steps(
 def _refine_steps(run: _Run, first_look: bool) -> Job[Statistics]:
     results, depsgraph, clock, statistics = run.results, run.depsgraph, run.clock, run.statistics
     scene = results.scene
-    use_machine(scene)
+    contents.use_machine(scene)
     yield Progress(0.0, "Reading the scene")
     if run.camera is None or run.given is None:
         depsgraph.update()  # reading what was deleted since the last step would crash Blender
     camera = run.camera or read_camera(scene, depsgraph, region_only=results.purpose == 'RENDER')
-    given = run.given or read_scene(scene, depsgraph)
+    given = run.given or contents.read_scene(scene, depsgraph)
     camera = camera.local()
     if scene.tetflora.expand_everything:  # for no camera: exports, and others' renderers
         camera = camera.counted_from(origin_near(given.seeds.position))
@@ -384,8 +371,8 @@ def _refine_steps(run: _Run, first_look: bool) -> Job[Statistics]:
     clock.lap("read")
     progress = Progress(0.02, "Compiling species")
     yield progress
-    flora = yield from call_in_thread(progress, compile_species, load_for(given.species, scene, depsgraph))
-    flora = run.flora = in_wind(scene, flora, camera, given.seeds.motion is not None)
+    flora = yield from call_in_thread(progress, compile_species, contents.load_for(given.species, scene, depsgraph))
+    flora = run.flora = contents.in_wind(scene, flora, camera, given.seeds.motion is not None)
     clock.lap("compile")
     full = yield from call_in_thread(progress, given.polygons_full, flora)
     if full > _MANY:
@@ -393,13 +380,13 @@ def _refine_steps(run: _Run, first_look: bool) -> Job[Statistics]:
     statistics.plants, statistics.polygons_full, statistics.unknown = len(given.seeds), full, given.unknown
     statistics.instances = sum(len(one) for one in given.places)
     refined = not scene.tetflora.expand_everything
-    asset_warnings.clear()
-    left = memory_left(scene, camera)
+    contents.asset_warnings.clear()
+    left = contents.memory_left(scene, camera)
     if not refined:
-        yield from call_in_thread(progress, check_expanded, flora, given.seeds, camera, left)
-    plain = not refined or is_plain(scene, given.places, depsgraph, left)
+        yield from call_in_thread(progress, contents.check_expanded, flora, given.seeds, camera, left)
+    plain = not refined or contents.is_plain(scene, given.places, depsgraph, left)
     if not plain:
-        run.bound = yield from bind_steps(scene, given.places, depsgraph, camera, left)
+        run.bound = yield from contents.bind_steps(scene, given.places, depsgraph, camera, left)
         clock.lap("compile")
     if run.bound is not None:
         statistics.polygons_full += run.bound.faces
@@ -417,7 +404,7 @@ def _refine_steps(run: _Run, first_look: bool) -> Job[Statistics]:
         elif plain and not given.others:
             in_main_thread(results.open)  # instances alone, best left as they are
         else:
-            run.settings = refinement_settings(scene)
+            run.settings = contents.refinement_settings(scene)
             yield from _write_refined(run)
         if plain:
             in_main_thread(partial(_write_plain, run))
@@ -438,7 +425,7 @@ def _first_look(run: _Run) -> Job[None]:
     whole = run.results
     results = Results(whole.scene, whole.purpose, "", run.data)
     results.origin, results.owners, results.looks = whole.origin, whole.owners, whole.looks
-    settings, camera = refinement_settings(whole.scene).first_look(), run.camera.smaller(FIRST_LOOK)
+    settings, camera = contents.refinement_settings(whole.scene).first_look(), run.camera.smaller(FIRST_LOOK)
     first = replace(run, results=results, given=replace(run.given, sources=None), settings=settings, camera=camera)
     first.originals, first.statistics, first.clock = [*run.originals], Statistics(), Stopwatch()
     try:
@@ -549,7 +536,7 @@ def _refined(run: _Run, disc: float) -> Job[EmissionInput]:
 def _write_refined(run: _Run) -> Job[None]:
     """Refine, and make meshes, instances and proxies; objects that scatter what has taken part are replaced as well."""
     scene, given = run.results.scene, run.given
-    run.form, left = proxy_kind_of(scene), memory_left(scene, run.camera)
+    run.form, left = proxy_kind_of(scene), contents.memory_left(scene, run.camera)
     # What the process holds already and what the image takes count too.
     run.settings = replace(run.settings, max_memory=left / 1e9 if np.isfinite(left) else 0.0)
     if given.sources is not None:

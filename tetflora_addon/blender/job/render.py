@@ -22,16 +22,8 @@ import bpy
 
 from ...errors import TetFloraError
 from ..main_thread import in_main_thread, window_draws
+from ..results import hiding
 from ..results.collection import has_results, leave_out_of_file, result_collections
-from ..results.hiding import (
-    hidden_originals,
-    lift_marks,
-    originals_shown,
-    pack_override_marks,
-    restore_marks,
-    show_left_over,
-    unpack_override_marks,
-)
 from ..results.output import KIND, adopt_materials, release_materials
 from ..results.proxy_kinds import raise_settings
 from ..runtime import Handlers, Listeners, complain, failed_frames, remember, with_uid
@@ -85,7 +77,9 @@ def on_render_pre(scene: bpy.types.Scene, _depsgraph: object = None) -> None:
     made = False
     try:
         wanted = scene.tetflora.refine_at_render and scene.tetflora.output.show_render
-        if wanted and (has_contents(scene) or hidden_originals(scene)):  # those may be in no collection meanwhile
+        if wanted and (
+            has_contents(scene) or hiding.hidden_originals(scene)
+        ):  # those may be in no collection meanwhile
             make = partial(_make, scene)
             with looked_at_once():
                 if window_draws():
@@ -142,8 +136,8 @@ def on_save_pre(_path: object, _other: object = None) -> None:
     for uid in _rendering.raised:
         _lower(uid)
     leave_out_of_file()
-    _rendering.lifted = lift_marks()
-    pack_override_marks()
+    _rendering.lifted = hiding.lift_marks()
+    hiding.pack_override_marks()
 
 
 def on_save_post(_path: object, _other: object = None) -> None:
@@ -153,8 +147,8 @@ def on_save_post(_path: object, _other: object = None) -> None:
     for uid in _rendering.raised:
         if (scene := with_uid(bpy.data.scenes, uid)) is not None:
             raise_settings(scene)
-    unpack_override_marks()
-    restore_marks(_rendering.lifted)
+    hiding.unpack_override_marks()
+    hiding.restore_marks(_rendering.lifted)
     _rendering.lifted.clear()
     release_materials()
 
@@ -166,8 +160,8 @@ def on_load_post(_path: object, _other: object = None) -> None:
     _rendering = _Rendering()
     failed_frames.clear()
     frame_cache.reset()
-    unpack_override_marks()
-    show_left_over()
+    hiding.unpack_override_marks()
+    hiding.show_left_over()
     for scene in bpy.data.scenes:
         if scene.library is None and scene.tetflora.statistics and not has_results(scene):
             scene.tetflora.statistics = ""
@@ -216,7 +210,7 @@ def _layers_of(scene: bpy.types.Scene) -> list[list[bpy.types.ViewLayer]]:
     """View layers with the same plants, at the scene's frame."""
     for earlier in result_collections(scene, 'VIEW'):
         adopt_materials(scene, earlier)  # before all else, or the next frame would count as changed
-    with originals_shown(scene):  # the previous frame has hidden some
+    with hiding.originals_shown(scene):  # the previous frame has hidden some
         return view_layer_groups(scene)
 
 

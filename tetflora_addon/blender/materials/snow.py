@@ -16,18 +16,8 @@ from typing import Any
 
 import bpy
 
+from . import microsphere
 from .materials import ASSET_PROXY, ASSET_SPHERE, BAKED, PROXY, SPHERE
-from .microsphere import (
-    BAKED_SHELL,
-    BAKED_SHELL_MATERIAL,
-    ENGINES,
-    MICROSPHERE,
-    SHELL,
-    SHELL_MATERIAL,
-    UNIT,
-    microsphere_group,
-    particle_normal,
-)
 from .nodes import LEAF_GREEN, SNOW, Graph, Term, is_own, node_group
 from .soil import is_soil
 
@@ -51,7 +41,7 @@ _CLUSTER = (*(0.92 * c for c in WHITE[:3]), 1.0)
 #: Proxies of which what lets no light through stands for twigs.
 _PROXIES = (PROXY, SPHERE, BAKED)
 _OTHERS = (ASSET_PROXY, ASSET_SPHERE)  # stand for materials of the artist
-_CLOUDS = (SHELL_MATERIAL, BAKED_SHELL_MATERIAL)
+_CLOUDS = (microsphere.SHELL_MATERIAL, microsphere.BAKED_SHELL_MATERIAL)
 
 
 def has_snow(scene: bpy.types.Scene) -> bool:
@@ -120,9 +110,9 @@ def snow_group() -> bpy.types.NodeTree:
     """
     inputs = (
         ("Shader", 'Shader'),
-        ("Carry", 'Float', 1.0, UNIT, "How much snow stays on it: less on thin things"),
+        ("Carry", 'Float', 1.0, microsphere.UNIT, "How much snow stays on it: less on thin things"),
         ("Snow Color", 'Color', WHITE),
-        ("Twigs", 'Float', 0.0, UNIT, "1: what lets no light through is thin, as in proxies"),
+        ("Twigs", 'Float', 0.0, microsphere.UNIT, "1: what lets no light through is thin, as in proxies"),
     )
 
     def build(graph: Graph, given: dict[str, Term]) -> dict[str, Any]:
@@ -142,12 +132,12 @@ def snow_group() -> bpy.types.NodeTree:
 
 def _cloud_group() -> bpy.types.NodeTree:
     """The group "TetFlora Snow Cloud": color and transmission of the particle that is hit in a cloud, under snow."""
-    inputs = (("Color", 'Color', LEAF_GREEN), ("Transmission", 'Float', 0.0, UNIT))
+    inputs = (("Color", 'Color', LEAF_GREEN), ("Transmission", 'Float', 0.0, microsphere.UNIT))
     outputs = (("Color", 'Color'), ("Transmission", 'Float'), ("Cover", 'Float'))
 
     def build(graph: Graph, given: dict[str, Term]) -> dict[str, Any]:
         geometry = graph.outputs("ShaderNodeNewGeometry")
-        particle = particle_normal(graph, {"Roundness": 1.0, "Facing": (0.0, 0.0, 0.0)}, geometry)
+        particle = microsphere.particle_normal(graph, {"Roundness": 1.0, "Facing": (0.0, 0.0, 0.0)}, geometry)
         axis = graph.attribute("tf_normal", "Vector")
         away = graph.vector('DOT_PRODUCT', axis, geometry["Incoming"]) < 0.0
         held, cover = [], []
@@ -192,14 +182,14 @@ def _amount_group() -> bpy.types.NodeTree:
 
 def _fit_cloud(snowy: bool) -> None:
     """Snow within the groups of shells, whose materials hold nothing else."""
-    for name in (SHELL, BAKED_SHELL):
+    for name in (microsphere.SHELL, microsphere.BAKED_SHELL):
         tree = bpy.data.node_groups.get((name, None))
         if tree is None or not is_own(tree) or any(_MARK in node for node in tree.nodes) == snowy:
             continue
         if not snowy:
             _clear(tree)
-        elif name == SHELL:
-            spheres = next(n for n in tree.nodes if n.type == 'GROUP' and n.node_tree.name == MICROSPHERE)
+        elif name == microsphere.SHELL:
+            spheres = next(n for n in tree.nodes if n.type == 'GROUP' and n.node_tree.name == microsphere.MICROSPHERE)
             node = _group_node(tree, _cloud_group(), spheres, mark=True)
             for key in ("Color", "Transmission"):
                 _put_between(tree, spheres.inputs[key], node.inputs[key], node.outputs[key])
@@ -212,13 +202,13 @@ def _cover_baked_shell(tree: bpy.types.NodeTree) -> None:
     end, before = next(node for node in tree.nodes if node.type == 'GROUP_OUTPUT'), set(tree.nodes)
     graph = Graph(tree, fresh=False)
     cover = graph.outputs("ShaderNodeGroup", node_tree=_cloud_group())["Cover"]
-    for engine, _ in ENGINES:
+    for engine, _ in microsphere.ENGINES:
         added = end.inputs[engine].links[0].from_node
         baked, clear = (socket.links[0].from_socket for socket in added.inputs)
         through = Term(graph, clear.node.inputs["Color"].links[0].from_socket)
         looks = {"Color": _CLUSTER, "s": 0.0, "p": graph.math('SUBTRACT', 1.0, through)}
         looks |= {"Normal": graph.attribute("tf_normal", "Vector"), "Plane": graph.attribute("tf_plane", "Fac")}
-        lit = graph.outputs("ShaderNodeGroup", looks, node_tree=microsphere_group())
+        lit = graph.outputs("ShaderNodeGroup", looks, node_tree=microsphere.microsphere_group())
         graph.feed(added.inputs[0], graph.mix(cover, baked, lit[engine]))
     for node in set(tree.nodes) - before:
         node[_MARK] = True

@@ -21,22 +21,8 @@ from ..runtime import JobData
 from ..scene.fields import fields_of, read_field
 from ..settings import check_limits
 from ..worker import run_to_end
-from .canopy import not_of_covers
-from .distances import SQUARE, distance_of, painted_weights
+from . import canopy, distances, plant_objects, populations, properties, rules
 from .ground import Ground
-from .plant_objects import (
-    PAINTED_MARK,
-    add_field,
-    add_plants_steps,
-    add_points,
-    editable,
-    plants_of,
-    positions,
-    take_points,
-)
-from .populations import own_number, own_objects
-from .properties import MOST_PAINTED_EMPTIES
-from .rules import note_erased
 
 PAINTED = "Painted plants"
 _OBJECTS = -1  # where single plants are, in place of the number of a field
@@ -57,14 +43,14 @@ def brush_of(scene: bpy.types.Scene, pressure: float = 1.0) -> tuple[Brush, tupl
     """
     settings = scene.tetflora.brush
     check_limits(settings, "Brush")
-    mix = painted_weights(scene)
+    mix = distances.painted_weights(scene)
     if not sum(mix.values()) > 0.0:
         raise SceneError("No species has a weight above 0; raise a weight in the list of species under Layers")
     brush = Brush(
         radius=settings.radius,
-        density=settings.density / SQUARE,
+        density=settings.density / distances.SQUARE,
         strength=max(0.01, settings.strength * pressure),
-        min_distance=distance_of(settings),
+        min_distance=distances.distance_of(settings),
         scale_min=settings.scale_min,
         scale_max=settings.scale_max,
         weights=tuple(mix.values()),
@@ -82,8 +68,8 @@ class Standing:
 
     def __init__(self, scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, covers: bool) -> None:
         """Read a scene, with or without what covers the ground."""
-        found = scene.objects if covers else not_of_covers(scene)
-        self.objects = plants_of(found)
+        found = scene.objects if covers else canopy.not_of_covers(scene)
+        self.objects = plant_objects.plants_of(found)
         self.fields = fields_of(found)
         places = [np.array([o.matrix_world.translation for o in self.objects], np.float64).reshape(-1, 3)]
         source, number = [np.full(len(self.objects), _OBJECTS)], [np.arange(len(self.objects))]
@@ -91,9 +77,9 @@ class Standing:
             np.array([o.library is None and o.override_library is None and o.visible_get() for o in self.objects], bool)
         ]
         for index, field in enumerate(self.fields):
-            own = editable(field)
+            own = plant_objects.editable(field)
             if own:
-                found = positions(field)
+                found = plant_objects.positions(field)
             else:
                 found = read_field(field, depsgraph, world_matrix(field, depsgraph)[None]).position
             places.append(found)
@@ -138,7 +124,7 @@ class Standing:
             keep = np.ones(int(own.sum()), bool)
             keep[self.number[gone & own]] = False
             if source != _OBJECTS:
-                take_points(self.fields[source], keep)
+                plant_objects.take_points(self.fields[source], keep)
             self.number[own] = (np.cumsum(keep) - 1)[self.number[own]]
         self.places, self.source = self.places[~gone], self.source[~gone]
         self.number, self.removable = self.number[~gone], self.removable[~gone]
@@ -234,11 +220,11 @@ class Stroke:
                 taken = self._taken.get(population.uid)
                 if taken is None:
                     continue
-                population.made = own_number(own_objects(self.scene, population))
+                population.made = populations.own_number(populations.own_objects(self.scene, population))
                 if self._weak:
-                    note_erased(population, np.concatenate(taken), _PLACE)
+                    rules.note_erased(population, np.concatenate(taken), _PLACE)
                 if self._cleared:
-                    note_erased(population, self._cleared, self.scene.tetflora.brush.radius)
+                    rules.note_erased(population, self._cleared, self.scene.tetflora.brush.radius)
             self._taken, self._cleared, self._weak = {}, [], False
 
     def _make(self, places: Floats, keys: Keys) -> None:
@@ -247,17 +233,18 @@ class Stroke:
         placement = Placement(position=places, wanted=len(keys), **made)
         standing = self.standing
         store, number = self.scene.tetflora.brush.store, len(standing.objects) + len(keys)
-        if not (store == 'FIELD' or (store == 'AUTOMATIC' and number > MOST_PAINTED_EMPTIES)):
+        if not (store == 'FIELD' or (store == 'AUTOMATIC' and number > properties.MOST_PAINTED_EMPTIES)):
             first = len(standing.objects)
-            standing.objects += run_to_end(add_plants_steps(self.scene, placement, species))
+            standing.objects += run_to_end(plant_objects.add_plants_steps(self.scene, placement, species))
             standing.add(places, _OBJECTS, first)
             return
-        number = next((i for i, o in enumerate(standing.fields) if o.get(PAINTED_MARK) and editable(o)), None)
+        painted = (o.get(plant_objects.PAINTED_MARK) and plant_objects.editable(o) for o in standing.fields)
+        number = next((i for i, own in enumerate(painted) if own), None)
         if number is None:
             number = len(standing.fields)
-            field = add_field(self.scene, placement, species)
+            field = plant_objects.add_field(self.scene, placement, species)
             field.name = field.data.name = PAINTED
-            field[PAINTED_MARK] = True
+            field[plant_objects.PAINTED_MARK] = True
             standing.fields.append(field)
             standing.add(places, number, 0)
             return
@@ -266,7 +253,7 @@ class Stroke:
         c, s, none = np.cos(placement.azimuth), np.sin(placement.azimuth), np.zeros(len(keys))
         rows = ((c, -s, none), (s, c, none), (none, none, none + 1.0))
         frame = np.stack([np.stack(row, axis=1) for row in rows], axis=1)
-        add_points(field, places, frame, placement.scale, placement.species, placement.seed, species)
+        plant_objects.add_points(field, places, frame, placement.scale, placement.species, placement.seed, species)
         standing.add(places, number, first)
 
 

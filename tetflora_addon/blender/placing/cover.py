@@ -30,11 +30,8 @@ from ..scene.crowns import crown_for, crown_steps
 from ..settings import with_identity
 from ..species.edits import catalog, species_data, species_for, store_species
 from ..worker import steps_in_thread
+from . import distances, populations, rules, terrain
 from .canopy import canopy_of, floor_steps, is_cover, shedder_of, standing
-from .distances import HECTARE
-from .populations import PlacedPlants, add_population, make_plants_steps, refuse_frozen, restored, still_there
-from .rules import active_population, checked_grounds, copy_settings, grounds_of
-from .terrain import MASKS, read_ground
 
 NAME, FALLEN_LEAVES = "Ground cover", "Fallen leaves"
 _SQUARE = 0.976  # mean square of the scales of a cover's plants
@@ -76,13 +73,13 @@ class Ingredient:
 class CoverResult:
     """What covering made."""
 
-    made: PlacedPlants
+    made: populations.PlacedPlants
     bare: list[str]  # grounds that keep a material of the artist's
 
 
 def covered_population(scene: bpy.types.Scene) -> bpy.types.PropertyGroup | None:
     """The population whose ground the button covers: the active one, or the one under which the active one grows."""
-    active = active_population(scene)
+    active = rules.active_population(scene)
     if active is None or not active.covers:
         return active
     return with_identity(scene.tetflora.layers, active.covers) or active
@@ -120,8 +117,8 @@ def cover_steps(
     scene, depsgraph, uid = data.scene, data.depsgraph, population.uid or ANYBODY
     grounds = yield from _begun(data, population, grounds)
     population = _again(data, population, uid)
-    own = {name: getattr(population, name) for name in MASKS} | dict(masks)
-    ground = read_ground(grounds, depsgraph, **own)
+    own = {name: getattr(population, name) for name in terrain.MASKS} | dict(masks)
+    ground = terrain.read_ground(grounds, depsgraph, **own)
     canopy, above = canopy_of(scene, depsgraph)
     if not len(canopy):
         raise SceneError(f'"{population.name}" has no plants whose ground could be covered; click Update first')
@@ -131,11 +128,11 @@ def cover_steps(
     floor = yield from steps_in_thread(told, progress)
     yield Progress(_PLANTING, "Planting")
     population = _again(data, population, uid)
-    with restored(scene):
+    with populations.restored(scene):
         parts = _parts(scene, canopy, above)
         found = cover_of(scene, uid) or _add_cover(scene, population, grounds, masks)
         _mix(found, parts, ground.map_area)
-        with closing(make_plants_steps(scene, depsgraph, found)) as steps:
+        with closing(populations.make_plants_steps(scene, depsgraph, found)) as steps:
             made = yield from part_of(steps, _PLANTING, 1.0)
         bare = _lay_soil(scene, cover_of(scene, uid), grounds, floor, above, ground.map_area) if soil else []
     return CoverResult(made, bare)
@@ -152,8 +149,8 @@ def _begun(
     yield (progress := Progress(0.0, _UNDER))
     found = cover_of(scene, population.uid or ANYBODY, fallen)
     if found is not None:
-        refuse_frozen(found)
-    grounds = checked_grounds(scene, population) if grounds is None else list(grounds)
+        populations.refuse_frozen(found)
+    grounds = rules.checked_grounds(scene, population) if grounds is None else list(grounds)
     data.add_objects(grounds)
     yield from crown_steps(progress, scene, standing(scene))
     return grounds
@@ -161,7 +158,7 @@ def _begun(
 
 def _again(data: JobData, population: bpy.types.PropertyGroup, uid: str) -> bpy.types.PropertyGroup:
     """A population, fetched again after others may have been added; settings for new ones stay where they are."""
-    return population if uid == ANYBODY else still_there(data, uid)
+    return population if uid == ANYBODY else populations.still_there(data, uid)
 
 
 def cover_of(scene: bpy.types.Scene, uid: str, fallen: bool = False) -> bpy.types.PropertyGroup | None:
@@ -179,11 +176,11 @@ def _add_cover(
 ) -> bpy.types.PropertyGroup:
     """A population for the cover, on the same ground and within the same limits; the covered one stays active."""
     index, uid = scene.tetflora.layers_index, population.uid
-    cover = add_population(scene, grounds, name=name)
+    cover = populations.add_population(scene, grounds, name=name)
     # Fetched again: adding to a list moves what is in it.
     source = with_identity(scene.tetflora.layers, uid)
     if source is not None:
-        copy_settings(source, cover)
+        rules.copy_settings(source, cover)
         scene.tetflora.layers_index = index
     for name, value in masks.items():
         setattr(cover, name, value)
@@ -246,7 +243,7 @@ def _mix(cover: bpy.types.PropertyGroup, parts: list[Ingredient], area: float) -
     if before and cover.density:
         cover.density *= whole / before
     else:
-        cover.density = whole * HECTARE * _affordable(whole, area)
+        cover.density = whole * distances.HECTARE * _affordable(whole, area)
 
 
 def _affordable(density: float, area: float) -> float:
@@ -281,7 +278,7 @@ def _strata(
 ) -> tuple[list[Stratum], list[Stratum]]:
     """What lies on the ground, and what grows on it: in numbers as if large ground had room for all that it should."""
     weights = sum(entry.weight for entry in cover.mix) or 1.0
-    thin = cover.density / HECTARE / weights
+    thin = cover.density / distances.HECTARE / weights
     thin = max(thin, min(thin / _affordable(weights, area), 1.0))
     lying: list[Stratum] = []
     growing: list[Stratum] = []
@@ -295,7 +292,7 @@ def _strata(
 
 
 @job("Strewing leaves")
-def strew_steps(data: JobData, population: bpy.types.PropertyGroup) -> Job[PlacedPlants | None]:
+def strew_steps(data: JobData, population: bpy.types.PropertyGroup) -> Job[populations.PlacedPlants | None]:
     """Strew the leaves that fall in autumn under a population; None where nothing above sheds its leaves.
 
     What an earlier run made for the same population is replaced; settings that were changed since stay. Closing the
@@ -309,7 +306,7 @@ def strew_steps(data: JobData, population: bpy.types.PropertyGroup) -> Job[Place
     scene, depsgraph, uid = data.scene, data.depsgraph, population.uid or ANYBODY
     grounds = yield from _begun(data, population, fallen=True)
     population = _again(data, population, uid)
-    with restored(scene):
+    with populations.restored(scene):
         canopy, above = canopy_of(scene, depsgraph)
         # Fallen leaves of each species: as many patches as have the area of what falls.
         parts = []
@@ -324,7 +321,7 @@ def strew_steps(data: JobData, population: bpy.types.PropertyGroup) -> Job[Place
         found = cover_of(scene, uid, fallen=True) or _add_cover(scene, population, grounds, {}, FALLEN_LEAVES)
         # Ground that is wholly suited, of all that falls on it.
         _mix(found, parts, canopy.area.sum() / FULL / len(parts))
-        with closing(make_plants_steps(scene, depsgraph, found)) as steps:
+        with closing(populations.make_plants_steps(scene, depsgraph, found)) as steps:
             return (yield from steps)
 
 
@@ -336,7 +333,7 @@ def cover_with_snow(scene: bpy.types.Scene, population: bpy.types.PropertyGroup)
     SceneError
         The population has no ground, or the ground has no material of this file.
     """
-    slots = [slot for obj in grounds_of(scene, population) for slot in obj.material_slots]
+    slots = [slot for obj in rules.grounds_of(scene, population) for slot in obj.material_slots]
     materials = dict.fromkeys(slot.material for slot in slots if slot.material is not None)
     own = [one for one in materials if one.library is None and one.override_library is None and one.node_tree]
     if not own:

@@ -23,17 +23,8 @@ from ...species.kinds import species_of
 from .. import settings
 from ..attributes import KINDS, read, values_of, world_matrix, write
 from ..saved_files import VERSION
+from ..scene import fields
 from ..scene.ages import plainly_aged, relative_heights
-from ..scene.fields import (
-    FIELD_ATTRIBUTES,
-    field_kinds,
-    fields_of,
-    has_history,
-    read_aged_field,
-    stored_ages,
-    stored_size,
-    write_field,
-)
 from ..scene.plants import single_plants
 from ..scene.skeletons import kind_of_choice, skeleton_object_of
 from ..species.edits import catalog, display_height
@@ -221,7 +212,7 @@ def add_field(
         Years; all are full-grown if not given.
     """
     rows = (placement.position, placement.rotation, placement.scale, placement.species, placement.seed)
-    return link_field(scene, write_field(FIELD, *rows, species, ages=ages), collection)
+    return link_field(scene, fields.write_field(FIELD, *rows, species, ages=ages), collection)
 
 
 def field_from_plants(
@@ -247,7 +238,7 @@ def field_from_plants(
     species = [species_of(kind) for kind in read.identifiers]
     forms = [skeleton_object_of(kind) for kind in read.identifiers]
     rows = (read.position, quaternions(read.frame), read.scale, read.species, read.seed)
-    made = link_field(scene, write_field(FIELD, *rows, species, forms, stored_ages(plants)), collection)
+    made = link_field(scene, fields.write_field(FIELD, *rows, species, forms, fields.stored_ages(plants)), collection)
     remove_plants(plants)
     return made
 
@@ -275,7 +266,7 @@ def plants_from_field(
     SceneError
         The field has no points, too many, or cannot be read; nothing is changed.
     """
-    read, ages = plainly_aged(scene, *read_aged_field(field, depsgraph, world_matrix(field, depsgraph)[None]))
+    read, ages = plainly_aged(scene, *fields.read_aged_field(field, depsgraph, world_matrix(field, depsgraph)[None]))
     if not 0 < len(read) <= most:
         raise SceneError(
             f'"{field.name}" has {len(read):,} plants; '
@@ -298,11 +289,11 @@ def remove_fields(objects: Iterable[bpy.types.Object], tidy: bool = True) -> int
     tidy : bool
         Remove collections that this leaves empty.
     """
-    fields = [o for o in fields_of(objects) if o.library is None]
-    number = sum(stored_size(field) for field in fields)
-    for field in fields:
+    gone = [o for o in fields.fields_of(objects) if o.library is None]
+    number = sum(fields.stored_size(field) for field in gone)
+    for field in gone:
         field.tetflora.is_field = False
-    ours = [field for field in fields if field.get(FIELD_MARK)]
+    ours = [field for field in gone if field.get(FIELD_MARK)]
     meshes = {field.data for field in ours}
     bpy.data.batch_remove(ours)
     bpy.data.batch_remove([mesh for mesh in meshes if not mesh.users])
@@ -413,9 +404,9 @@ def editable(obj: bpy.types.Object) -> bool:
         and not obj.data.edges
         and not obj.data.polygons
         and obj.data.shape_keys is None
-        and not has_history(obj)
+        and not fields.has_history(obj)
         and all(a.data_type in KINDS for a in obj.data.attributes if not a.is_internal)
-        and all(a.data_type == FIELD_ATTRIBUTES.get(a.name, a.data_type) for a in obj.data.attributes)
+        and all(a.data_type == fields.FIELD_ATTRIBUTES.get(a.name, a.data_type) for a in obj.data.attributes)
     )
 
 
@@ -466,7 +457,7 @@ def add_points(
         "seed": np.asarray(seed),
     }
     points, before = _points(obj.data), len(obj.data.vertices)
-    for name, kind in FIELD_ATTRIBUTES.items():
+    for name, kind in fields.FIELD_ATTRIBUTES.items():
         if name not in points:
             points[name] = (kind, np.full((before, *own[name].shape[1:]), name == "scale", KINDS[kind].dtype))
     joined: Points = {}
@@ -525,7 +516,7 @@ def _join_equal_kinds(obj: bpy.types.Object) -> None:
 
 
 def _kind_number(obj: bpy.types.Object, identifier: str) -> int:
-    kinds = field_kinds(obj) if obj.tetflora.field_species else ()
+    kinds = fields.field_kinds(obj) if obj.tetflora.field_species else ()
     if identifier in kinds:
         return kinds.index(identifier)
     obj.tetflora.field_species.add().species = identifier

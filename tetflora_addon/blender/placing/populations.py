@@ -28,16 +28,8 @@ from ..scene.fields import fields_of, stored_size
 from ..settings import BIOME, SCATTER, with_identity
 from ..species.edits import revert_species
 from ..worker import call_in_thread, run_to_end
+from . import plant_objects
 from .canopy import is_cover, standing
-from .plant_objects import (
-    POPULATION_MARK,
-    add_field,
-    add_plants_steps,
-    plant_collection,
-    plants_of,
-    remove_empty_collections,
-    remove_fields,
-)
 from .properties import MOST_EMPTIES, TetFloraLayer
 from .rules import copy_settings, fingerprint, makes_field, read_search, set_grounds
 
@@ -149,15 +141,15 @@ def make_plants_steps(data: JobData, population: TetFloraLayer) -> Job[PlacedPla
     _remove(own)
     collection = collection_of(scene, population)
     if field:
-        made = [add_field(scene, placement, search.species, collection, ages)]
+        made = [plant_objects.add_field(scene, placement, search.species, collection, ages)]
         made[0].display_type = 'BOUNDS'  # its points would turn the ground black, and many take long to draw
     elif own:
-        made = run_to_end(add_plants_steps(scene, placement, search.species, collection, ages))
+        made = run_to_end(plant_objects.add_plants_steps(scene, placement, search.species, collection, ages))
     for number, obj in enumerate(made):
         group = obj.tetflora
         group.population, group.population_number = population.uid, number
     if not made:
-        remove_empty_collections()
+        plant_objects.remove_empty_collections()
     population.made, population.message = len(placement), placement.reason
     population.placed_by = fingerprint(population)
     returned = min(returned, len(placement))
@@ -188,7 +180,7 @@ def _new_plants(
     ages: Floats32 | None,
 ) -> Job[list[bpy.types.Object]]:
     """Plants where none have to go before."""
-    steps, made = add_plants_steps(scene, placement, species, collection, ages), []
+    steps, made = plant_objects.add_plants_steps(scene, placement, species, collection, ages), []
     try:
         while True:
             made = next(steps)
@@ -197,7 +189,7 @@ def _new_plants(
         return stop.value
     except BaseException:
         bpy.data.batch_remove([obj for obj in made if is_there(obj)])
-        remove_empty_collections()
+        plant_objects.remove_empty_collections()
         raise
 
 
@@ -228,10 +220,10 @@ def remove_layer(scene: bpy.types.Scene, index: int, keep_plants: bool = False) 
         number = own_number(own)
         _remove(own)
         _dissolve(scene, layer.collection)
-        number += remove_fields([field], tidy=False) if field is not None else 0
+        number += plant_objects.remove_fields([field], tidy=False) if field is not None else 0
     group.layers.remove(index)
     group.layers_index = max(min(group.layers_index, len(group.layers) - 1), 0)
-    remove_empty_collections()
+    plant_objects.remove_empty_collections()
     return number
 
 
@@ -298,8 +290,8 @@ def _release(objects: Iterable[bpy.types.Object]) -> None:
 
 def _remove(objects: Iterable[bpy.types.Object]) -> None:
     objects = list(objects)
-    plants, fields = plants_of(objects), fields_of(objects)
-    remove_fields(fields, tidy=False)  # the collection keeps what the artist set for it
+    plants, fields = plant_objects.plants_of(objects), fields_of(objects)
+    plant_objects.remove_fields(fields, tidy=False)  # the collection keeps what the artist set for it
     bpy.data.batch_remove(plants)
 
 
@@ -308,8 +300,8 @@ def collection_of(scene: bpy.types.Scene, population: TetFloraLayer) -> bpy.type
     found = population.collection
     if found is None or found.library is not None or found not in set(scene.collection.children_recursive):
         found = population.collection = bpy.data.collections.new(population.name)
-        found[POPULATION_MARK] = True
-        plant_collection(scene).children.link(found)
+        found[plant_objects.POPULATION_MARK] = True
+        plant_objects.plant_collection(scene).children.link(found)
     found.name = population.name
     return found
 
@@ -318,7 +310,7 @@ def _dissolve(scene: bpy.types.Scene, collection: bpy.types.Collection | None) -
     """Take a population's collection away; what else lies in it goes up to the scene's collection for plants."""
     if collection is None or collection.library is not None:
         return
-    parent = plant_collection(scene)
+    parent = plant_objects.plant_collection(scene)
     for obj in collection.objects:
         if obj.name not in parent.objects:
             parent.objects.link(obj)

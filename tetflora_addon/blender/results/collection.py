@@ -17,23 +17,10 @@ from ..runtime import JobData, is_there
 from ..scene.looks import LIKE
 from ..settings import switches
 from ..species.catalog import SpeciesChoice, gallery_of
+from . import output
 from .hiding import adopt_copies
 from .meshes import mesh_steps, point_object
-from .output import (
-    KIND,
-    PURPOSE,
-    SOURCE,
-    SWITCHES,
-    dress,
-    dress_collection,
-    keep_materials,
-    mark_runtime,
-    parent_of,
-    remove_collection,
-    remove_made,
-    remove_unused,
-    result_collections,
-)
+from .output import result_collections
 
 #: Bytes of a name in Blender 4.5 (5.0 takes more), less those of the number that it appends to equal names.
 _LONGEST = 59
@@ -83,7 +70,7 @@ class Results:
         snow.fit_soils()
         self.collection = bpy.data.collections.new(name)
         self._names.append((self.collection, name))
-        self.collection[PURPOSE] = self.purpose
+        self.collection[output.PURPOSE] = self.purpose
         self.collection[UNFINISHED] = True
         tag(self.collection)
         if self.data is not None:
@@ -159,7 +146,7 @@ class Results:
         """
         for source in sources:
             if is_own(source):
-                made[SOURCE] = source
+                made[output.SOURCE] = source
         return self._link(name, made, kind, None, placed=placed)
 
     def _link(
@@ -178,7 +165,7 @@ class Results:
             self.data.add("a part of the result", *own)
         if not placed:
             made.location = self.origin
-        made[KIND] = kind
+        made[output.KIND] = kind
         if look:
             made[LIKE] = look
         for datablock in own:
@@ -192,10 +179,10 @@ class Results:
     def _show(self, made: bpy.types.Object, species: Species | None) -> None:
         """Add an object to the collection, as the settings have it; Blender then lists all objects anew."""
         if species is not None:
-            made.parent = parent_of(self.collection, species.identifier, species.name)
+            made.parent = output.parent_of(self.collection, species.identifier, species.name)
             self._made.append(made.parent)
         made.hide_select = True  # artists select and edit plants, not millions of polygons
-        dress(self.scene, made, "" if species is None else species.identifier)
+        output.dress(self.scene, made, "" if species is None else species.identifier)
         self.collection.objects.link(made)
 
     def finish(self) -> None:
@@ -212,18 +199,18 @@ class Results:
                 made.name = name
                 tag(made)
         if self.purpose == 'VIEW':
-            dress_collection(self.scene, self.collection)
+            output.dress_collection(self.scene, self.collection)
         else:
             self.scene.collection.children.link(self.collection)
-            mark_runtime(self.collection, True)
-        remove_unused(self._held)  # that nothing shows
+            output.mark_runtime(self.collection, True)
+        output.remove_unused(self._held)  # that nothing shows
 
     def discard(self) -> None:
         """Remove everything made so far, whatever of it or of the scene somebody else has removed."""
         if self.collection is not None and is_there(self.collection):
-            remove_collection(self.scene if is_there(self.scene) else None, self.collection)
+            output.remove_collection(self.scene if is_there(self.scene) else None, self.collection)
         self.collection = None
-        remove_made([*self._made, *self._held])
+        output.remove_made([*self._made, *self._held])
         self._held = []
         self._made, self._waiting, self._shared = [], [], {}
 
@@ -232,7 +219,7 @@ def dress_results(scene: bpy.types.Scene) -> None:
     """Apply the output settings of a scene to the artist's results."""
     adopt_copies()
     for collection in result_collections(scene, 'VIEW'):
-        dress_collection(scene, collection)
+        output.dress_collection(scene, collection)
 
 
 def has_results(scene: bpy.types.Scene) -> bool:
@@ -250,10 +237,10 @@ def leave_out_of_file() -> None:
         saved = scene.tetflora.output.save_results
         for collection in result_collections(scene) if scene.library is None else ():
             # While refinement runs, the file gets the earlier results.
-            runtime = collection[PURPOSE] == 'RENDER' or not saved or UNFINISHED in collection
-            mark_runtime(collection, runtime)
-            if runtime and collection[PURPOSE] == 'VIEW':
-                keep_materials(collection)
+            runtime = collection[output.PURPOSE] == 'RENDER' or not saved or UNFINISHED in collection
+            output.mark_runtime(collection, runtime)
+            if runtime and collection[output.PURPOSE] == 'VIEW':
+                output.keep_materials(collection)
 
 
 _COMMON = {"update": lambda self, _context: dress_results(self.id_data), **FIXED}
@@ -301,7 +288,7 @@ _PLACES = {
         **_COMMON,
     ),
 }
-_RAYS = {name: boolean(**given, **_COMMON) for name, given in SWITCHES.items()}
+_RAYS = {name: boolean(**given, **_COMMON) for name, given in output.SWITCHES.items()}
 
 
 class TetFloraOutput(

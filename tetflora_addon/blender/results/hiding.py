@@ -20,16 +20,7 @@ import bpy
 from ...errors import SceneError
 from ..materials.nodes import MADE, is_ours, is_own, tag, untag
 from ..scene.motion import curves_of
-from .output import (
-    KIND,
-    PARENT,
-    PURPOSE,
-    mark_runtime,
-    release_copies,
-    remove_collection,
-    result_collections,
-    sources_of,
-)
+from . import output
 
 #: Custom properties of scenes: one entry for what is hidden.
 HIDDEN_LINKED = {'VIEW': "tetflora_hidden_linked", 'RENDER': "tetflora_hidden_linked_for_render"}
@@ -223,7 +214,7 @@ def remove_results(
     for which in ('RENDER', 'VIEW'):
         if purpose in {None, which}:
             show_originals(scene, which)
-    return sum(remove_collection(scene, c) for c in result_collections(scene, purpose) if c not in keep)
+    return sum(output.remove_collection(scene, c) for c in output.result_collections(scene, purpose) if c not in keep)
 
 
 def adopt_copies() -> None:
@@ -232,7 +223,9 @@ def adopt_copies() -> None:
     Copies inherit marks but not names, and what their originals hide is hidden for the scene that was copied.
     """
     for scene in bpy.data.scenes:
-        copies = [c for c in result_collections(scene) if not is_ours(c) and (c[MADE], None) in bpy.data.collections]
+        copies = [
+            c for c in output.result_collections(scene) if not is_ours(c) and (c[MADE], None) in bpy.data.collections
+        ]
         for collection in copies:
             every = [collection, *collection.objects, *(o.data for o in collection.objects if o.data is not None)]
             ours = [d for d in every if MADE in d and d.library is None]
@@ -312,7 +305,7 @@ def _replacing(original: bpy.types.Object, purpose: str) -> list[bpy.types.Scene
     return [
         scene
         for scene in bpy.data.scenes
-        if result_collections(scene, purpose)
+        if output.result_collections(scene, purpose)
         and (scene.name in names or (renamed and scene.objects.get(original.name) == original))
     ]
 
@@ -329,19 +322,19 @@ def keep_results(scene: bpy.types.Scene) -> int:
                 untag(entry["collection"])
         del scene[HIDDEN_LINKED['VIEW']]
     kept = 0
-    for collection in result_collections(scene, 'VIEW'):
-        mark_runtime(collection, False)
-        for source in sources_of(collection.objects):
+    for collection in output.result_collections(scene, 'VIEW'):
+        output.mark_runtime(collection, False)
+        for source in output.sources_of(collection.objects):
             untag(source)
         for obj in collection.objects:
             if is_own(obj):
-                kept += obj.get(KIND) != PARENT
+                kept += obj.get(output.KIND) != output.PARENT
                 obj.hide_select = False
                 for datablock in (obj, obj.data):
                     if datablock is not None:
                         untag(datablock)
-        release_copies(collection)
-        del collection[PURPOSE]
+        output.release_copies(collection)
+        del collection[output.PURPOSE]
         untag(collection)
         collection.name = "TetFlora kept"
     return kept
@@ -402,14 +395,14 @@ def restore_marks(lifted: dict[tuple, str | list]) -> None:
 def show_left_over() -> None:
     """Show what is hidden for results that the file that was just read does not hold."""
     for scene, purpose in list(scenes_hiding()):
-        if purpose == 'RENDER' or not result_collections(scene, 'VIEW'):
+        if purpose == 'RENDER' or not output.result_collections(scene, 'VIEW'):
             show_linked(scene, purpose)
     for original in _marked('RENDER'):
         _show(original, 'RENDER')
     for original in _marked('VIEW'):
         names = _marker(original, 'VIEW')[1]
         homes = [s for s in bpy.data.scenes if s.name in names or s.objects.get(original.name) == original]
-        if not any(result_collections(scene, 'VIEW') for scene in homes):
+        if not any(output.result_collections(scene, 'VIEW') for scene in homes):
             _show(original, 'VIEW')
 
 

@@ -98,8 +98,10 @@ def add_cluster_instances(
     """
     key = ("clusters", *(o.session_uid for o in objects))
     collection = results.shared(key, lambda: _collection(results, "clusters", objects))
-    # Blender numbers the objects of a collection by their names.
-    order = sorted(range(len(objects)), key=lambda i: _natural(objects[i].name))
+    # Blender numbers the objects of a collection by their names: numbers within count as such, and case does not.
+    names = [re.split(r"(\d+)", obj.name.casefold()) for obj in objects]
+    keys = [[(p.isdigit(), int(p) if p.isdigit() else 0, p) for p in parts if p] for parts in names]
+    order = sorted(range(len(objects)), key=keys.__getitem__)
     place = np.zeros(len(objects), np.int32)
     place[order] = np.arange(len(objects), dtype=np.int32)
     name = results.name_for(name)
@@ -236,12 +238,6 @@ def _collection(results: Results, name: str, objects: Sequence[bpy.types.Object]
 
     in_main_thread(link)
     return made
-
-
-def _natural(name: str) -> list[tuple[bool, int, str]]:
-    """Key to sort names as Blender does: numbers within count as such, and case does not."""
-    parts = re.split(r"(\d+)", name.casefold())
-    return [(p.isdigit(), int(p) if p.isdigit() else 0, p) for p in parts if p]
 
 
 _BARE_VERSION = 1

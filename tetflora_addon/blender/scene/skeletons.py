@@ -8,16 +8,8 @@ from numpy.typing import NDArray
 
 from ...arrays import Floats, Integers
 from ...errors import SpeciesError
+from ...species import skeletons
 from ...species.kinds import Kind
-from ...species.skeletons import (
-    Chains,
-    Skeleton,
-    bezier_chains,
-    joined_edges,
-    nurbs_chain,
-    skeleton_from_edges,
-    smooth_handles,
-)
 from ..attributes import frames_of, members, mesh_of, values_of, world_matrix
 
 #: Types of objects that can be the skeleton of a plant.
@@ -33,7 +25,7 @@ def upright_turn(matrix: Floats) -> float:
     return float(np.arctan2(matrix[1, 0], matrix[0, 0])) if np.hypot(*matrix[:2, 0]) > 0 else 0.0
 
 
-def read_skeleton(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Skeleton:
+def read_skeleton(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> skeletons.Skeleton:
     """The skeleton that an object draws.
 
     Parameters
@@ -71,10 +63,10 @@ def read_skeleton(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Skel
     else:
         chains = _of_curve(obj, depsgraph) if obj.type == 'CURVE' else _of_hair(obj, depsgraph)
         # Radii in the object's own measure, as they are joined there.
-        points, edges, line = joined_edges(chains)
+        points, edges, line = skeletons.joined_edges(chains)
     turn = upright_turn(matrix)
     upright = np.array([[np.cos(turn), np.sin(turn), 0], [-np.sin(turn), np.cos(turn), 0], [0, 0, 1]]) @ matrix[:3, :3]
-    return skeleton_from_edges(points[:, :3] @ upright.T, points[:, 3] * scale[0], edges, obj.name, line)
+    return skeletons.skeleton_from_edges(points[:, :3] @ upright.T, points[:, 3] * scale[0], edges, obj.name, line)
 
 
 def _of_mesh(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> tuple[Floats, Integers]:
@@ -102,7 +94,7 @@ def _mesh_arrays(mesh: bpy.types.Mesh) -> tuple[Floats, Integers]:
     return points, members(mesh.edges, "vertices", 2, np.int32).astype(np.int64)
 
 
-def _of_curve(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Chains:
+def _of_curve(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> skeletons.Chains:
     """Splines of a curve object, with shape keys and modifiers that move its control points."""
     evaluated = obj.evaluated_get(depsgraph)
     curve = evaluated.to_curve(depsgraph, apply_modifiers=True) if evaluated.is_evaluated else obj.data
@@ -111,26 +103,26 @@ def _of_curve(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Chains:
     finally:
         if evaluated.is_evaluated:
             evaluated.to_curve_clear()
-    chains = Chains.concatenate(parts)
+    chains = skeletons.Chains.concatenate(parts)
     return _meant_radii(chains, _thickness(obj.data))
 
 
-def spline_chain(spline: bpy.types.Spline) -> Chains:
+def spline_chain(spline: bpy.types.Spline) -> skeletons.Chains:
     """A spline as it is drawn, in its object's space."""
     cyclic = np.array([spline.use_cyclic_u])
     if spline.type == 'BEZIER':
         knots = spline.bezier_points
         places = np.column_stack([_read(knots, "co", 3), _read(knots, "radius")])
         handles = (_read(knots, side, 3) for side in ("handle_left", "handle_right"))
-        control = Chains(places, np.array([0, len(knots)]), cyclic)
-        return bezier_chains(control, *handles, np.array([spline.resolution_u]))
+        control = skeletons.Chains(places, np.array([0, len(knots)]), cyclic)
+        return skeletons.bezier_chains(control, *handles, np.array([spline.resolution_u]))
     places = _read(spline.points, "co", 4)
     weights = places[:, 3].copy()
     places[:, 3] = _read(spline.points, "radius")
     if spline.type == 'NURBS':
         flags = {"endpoint": spline.use_endpoint_u, "bezier": spline.use_bezier_u, "cyclic": spline.use_cyclic_u}
-        return nurbs_chain(places, weights, spline.order_u, spline.resolution_u, **flags)
-    return Chains(places, np.array([0, len(places)]), cyclic)
+        return skeletons.nurbs_chain(places, weights, spline.order_u, spline.resolution_u, **flags)
+    return skeletons.Chains(places, np.array([0, len(places)]), cyclic)
 
 
 def _thickness(curve: bpy.types.Curve) -> float:
@@ -140,17 +132,17 @@ def _thickness(curve: bpy.types.Curve) -> float:
     return curve.bevel_depth
 
 
-def _meant_radii(chains: Chains, thickness: float) -> Chains:
+def _meant_radii(chains: skeletons.Chains, thickness: float) -> skeletons.Chains:
     """Radii in the object's space; 0 where all are equal and nothing shows them, as in new curves."""
     points = chains.points.copy()
     if thickness > 0:
         points[:, 3] *= thickness
     elif len(points) and np.ptp(points[:, 3]) < 1e-6:
         points[:, 3] = 0.0
-    return Chains(points, chains.first, chains.cyclic)
+    return skeletons.Chains(points, chains.first, chains.cyclic)
 
 
-def _of_hair(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Chains:
+def _of_hair(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> skeletons.Chains:
     """Hair curves with their modifiers."""
     curves = obj.evaluated_get(depsgraph).data
     points = np.zeros((len(curves.points), 4))
@@ -160,13 +152,13 @@ def _of_hair(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Chains:
     first = np.append(starts, len(points)).astype(np.int64)
     none = np.zeros(len(starts), np.int32)
     kind = _attribute(curves, "curve_type", none)
-    control = Chains(points, first, _attribute(curves, "cyclic", none > 0))
+    control = skeletons.Chains(points, first, _attribute(curves, "cyclic", none > 0))
     steps = _attribute(curves, "resolution", none + _DEFAULT_STEPS)
-    left, right = smooth_handles(control)
+    left, right = skeletons.smooth_handles(control)
     bezier = np.repeat(kind == _BEZIER, np.diff(first))[:, None]
     left = np.where(bezier, _attribute(curves, "handle_left", left), left)
     right = np.where(bezier, _attribute(curves, "handle_right", right), right)
-    chains = bezier_chains(control, left, right, np.where(kind == _POLY, 1, steps))
+    chains = skeletons.bezier_chains(control, left, right, np.where(kind == _POLY, 1, steps))
     nurbs = np.flatnonzero(kind == _NURBS)
     if len(nurbs):
         weights = _attribute(curves, "nurbs_weight", np.ones(len(points)))
@@ -176,8 +168,8 @@ def _of_hair(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Chains:
         for i in nurbs.tolist():
             own = slice(first[i], first[i + 1])
             flags = {"endpoint": mode[i] in (1, 3), "bezier": mode[i] in (2, 3), "cyclic": bool(control.cyclic[i])}
-            parts.append(nurbs_chain(points[own], weights[own], int(order[i]), int(steps[i]), **flags))
-        chains = Chains.concatenate(parts)
+            parts.append(skeletons.nurbs_chain(points[own], weights[own], int(order[i]), int(steps[i]), **flags))
+        chains = skeletons.Chains.concatenate(parts)
     return _meant_radii(chains, 0.0)
 
 

@@ -5,7 +5,7 @@
 import time
 from collections.abc import Callable, Iterable
 from contextlib import closing, suppress
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 
 import bpy
 import numpy as np
@@ -26,23 +26,7 @@ from ..placing.plant_objects import link_field
 from ..placing.rules import digest, zone_values, zoned
 from ..placing.terrain import read_ground
 from ..runtime import JobData, is_there, job
-from ..scene.fields import (
-    FIT,
-    OFFSET,
-    PLANT,
-    SIZE_ATTRIBUTES,
-    YEAR,
-    YEAR_PATH,
-    clear_years,
-    field_kinds,
-    has_history,
-    in_year,
-    read_points,
-    read_records,
-    read_sizes,
-    write_field,
-    year_curves,
-)
+from ..scene import fields
 from ..settings import check_limits
 from ..species.edits import catalog, species_for
 from ..worker import call_in_thread, steps_in_thread
@@ -231,7 +215,9 @@ def new_stand_steps(
     scene, grounds = data.scene, list(grounds)
     data.add_objects(grounds)
     # The field comes first, with the settings that its plants will grow by: those of the scene may change meanwhile.
-    field = write_field(name, np.zeros((0, 3)), np.zeros((0, 4)), *np.zeros((1, 0)), *np.zeros((2, 0), np.int32), ())
+    field = fields.write_field(
+        name, np.zeros((0, 3)), np.zeros((0, 4)), *np.zeros((1, 0)), *np.zeros((2, 0), np.int32), ()
+    )
     mesh, made = field.data, False
     try:
         stand = field.tetflora.stand
@@ -279,8 +265,8 @@ def _again_steps(data: JobData, field: bpy.types.Object, grounds: list[bpy.types
         raise SceneError(f'"{field.name}" has no species; add one to the list')
     members = [StandSpecies(species_for(scene, e.species), e.planted, e.incoming_seeds) for e in entries]
     names = [entry.species for entry in entries]
-    soil = Soil(**{f.name: getattr(stand, f.name) for f in fields(Soil)})
-    settings = StandSettings(**{f.name: getattr(stand, f.name) for f in fields(StandSettings)})
+    soil = Soil(**{name: getattr(stand, name) for name in Soil.__dataclass_fields__})
+    settings = StandSettings(**{name: getattr(stand, name) for name in StandSettings.__dataclass_fields__})
     ground = read_ground(grounds, depsgraph, **{name: getattr(stand, name) for name in _MASKS})
     ground = zoned(depsgraph, stand, grounds, ground)
     site, corner = yield from call_in_thread(progress, stand_site, ground, soil)
@@ -348,10 +334,10 @@ def _columns(records: Records, site: StandSite, corner: Floats) -> tuple[Floats,
 def _replace(field: bpy.types.Object, names: list[str], position: Floats, rotation: Floats, records: Records) -> None:
     """Give a field the records in place of its points."""
     given = position, rotation, np.ones(len(records)), records.species, records.seed
-    other = write_field(NAME, *given, names)
+    other = fields.write_field(NAME, *given, names)
     sizes = (records.height, records.diameter, records.crown_width, records.crown_base, records.dead, records.offset)
     field.matrix_world = other.matrix_world.copy()
-    _hand_over(other, field, {**_size_columns(*sizes), YEAR: records.year, PLANT: records.plant})
+    _hand_over(other, field, {**_size_columns(*sizes), fields.YEAR: records.year, fields.PLANT: records.plant})
     group = field.tetflora
     forms = {entry.species: entry.skeleton for entry in group.field_species}
     group.field_species.clear()
@@ -362,14 +348,14 @@ def _replace(field: bpy.types.Object, names: list[str], position: Floats, rotati
 
 def _size_columns(*sizes: NDArray) -> dict[str, NDArray]:
     """Attributes of height, diameter, width and base of the crown, share that is dead, and offset (n, 2) of plants."""
-    names = ("tf_height", "tf_diameter", "tf_crown_width", "tf_crown_base", "tf_dead", OFFSET)
-    return {**dict(zip(names, sizes, strict=True)), OFFSET: np.pad(sizes[-1], ((0, 0), (0, 1)))}
+    names = ("tf_height", "tf_diameter", "tf_crown_width", "tf_crown_base", "tf_dead", fields.OFFSET)
+    return {**dict(zip(names, sizes, strict=True)), fields.OFFSET: np.pad(sizes[-1], ((0, 0), (0, 1)))}
 
 
 def _hand_over(other: bpy.types.Object, field: bpy.types.Object, columns: dict[str, NDArray]) -> None:
     """Give a field the points of another, which goes, and columns of sizes."""
     for name, column in columns.items():
-        write(other.data, name, column, data_type=SIZE_ATTRIBUTES[name])
+        write(other.data, name, column, data_type=fields.SIZE_ATTRIBUTES[name])
     old, field.data = field.data, other.data
     bpy.data.objects.remove(other)
     if not old.users:
@@ -385,22 +371,22 @@ def keep_year(field: bpy.types.Object) -> int:
     SceneError
         It is no history, or cannot be read.
     """
-    if not has_history(field):
+    if not fields.has_history(field):
         raise SceneError(f'"{field.name}" has no years; select a stand that was grown')
     group, parts = field.tetflora, [field.data]
-    points, sizes = read_points(field, field_kinds(field), parts), read_sizes(field, parts)
-    points, sizes = in_year(points, sizes, read_records(field, parts), group.stand_year, False)
+    points, sizes = fields.read_points(field, fields.field_kinds(field), parts), fields.read_sizes(field, parts)
+    points, sizes = fields.in_year(points, sizes, fields.read_records(field, parts), group.stand_year, False)
     number = len(points.species)
     if not number:
         raise SceneError(f'"{field.name}" has no plants in this year; choose another')
     turn = quaternions(np.moveaxis(points.rotation, 2, 0))
     own = points.species.astype(np.int32), points.seed.astype(np.int32)
-    other = write_field(field.data.name, points.position, turn, points.scale.mean(axis=0), *own, ())
+    other = fields.write_field(field.data.name, points.position, turn, points.scale.mean(axis=0), *own, ())
     # `write_field` counts from a corner near the points; here they stay in the field's own space.
     write(other.data, "position", points.position)
     _hand_over(other, field, _stored(sizes))
     field.display_type, group.seed = 'TEXTURED', 0
-    clear_years(field)
+    fields.clear_years(field)
     return number
 
 
@@ -411,7 +397,7 @@ def _stored(sizes: Sizes | None) -> dict[str, NDArray]:
     found = _size_columns(sizes.height, sizes.diameter, sizes.width, sizes.base, sizes.dead, sizes.offset)
     found = {name: column for name, column in found.items() if column.any()}
     if (sizes.fit != 1.0).any():
-        found[FIT] = np.pad(sizes.fit, ((0, 0), (0, 1)))
+        found[fields.FIT] = np.pad(sizes.fit, ((0, 0), (0, 1)))
     return found
 
 
@@ -423,19 +409,19 @@ def animate(field: bpy.types.Object, first: int, last: int) -> tuple[float, floa
     SceneError
         It is no history.
     """
-    if not has_history(field):
+    if not fields.has_history(field):
         raise SceneError(f'"{field.name}" has no years; select a stand that was grown')
     animation = field.animation_data
     if animation is not None and animation.action is not None and animation.action.library is not None:
         raise SceneError(f'The keys of "{field.name}" are linked from another file; make them local first')
-    begin, end = 0.0, float(read_records(field, [field.data]).year.max())
+    begin, end = 0.0, float(fields.read_records(field, [field.data]).year.max())
     group = field.tetflora
     group.stand_smooth = True
-    clear_years(field)
+    fields.clear_years(field)
     for frame, at in ((first, begin), (last, end)):
         group.stand_year = at
-        field.keyframe_insert(YEAR_PATH, frame=frame)
-    for curve in year_curves(field):
+        field.keyframe_insert(fields.YEAR_PATH, frame=frame)
+    for curve in fields.year_curves(field):
         for point in curve.keyframe_points:
             point.interpolation = 'LINEAR'
     return begin, end

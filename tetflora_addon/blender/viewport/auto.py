@@ -28,7 +28,7 @@ from ..properties import auto_refine_switched
 from ..results.collection import has_results
 from ..results.leaf_objects import leaf_objects
 from ..results.output import PURPOSE, remove_collection, result_collections
-from ..runtime import GoneError, Handlers, call_off, call_soon, redraw, with_uid
+from ..runtime import GoneError, Handlers, call_off, call_soon, in_order, listening, redraw, with_uid
 from ..scene.camera import view_camera
 from ..scene.fields import stand_years
 from ..settings import season_of, wind_of, years_of
@@ -240,7 +240,8 @@ def on_change(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
     settings = f"{choices(scene)}{camera_now(scene)}{leaf_objects(scene)}"
     other = _seen.get(scene.session_uid) != settings
     _seen[scene.session_uid] = settings
-    concerns = [update for update in depsgraph.updates if _concerns(update)]
+    changed = [one for one in depsgraph.updates if isinstance(one.id.original, _CHANGING)]
+    concerns = [one for one in changed if not is_ours(one.id.original)]
     at_it = _state.steps is not None and scene.session_uid == _state.scene
     # Objects that have neither moved nor another form nor other settings may have been hidden.
     flags = (
@@ -262,11 +263,6 @@ def on_frame(scene: bpy.types.Scene, _depsgraph: object = None) -> None:
     moves = wind_of(scene) is not None or season_of(scene) is not None or years_of(scene) > 0.0
     if moves or stand_years(scene):
         schedule(scene)
-
-
-def _concerns(update: bpy.types.DepsgraphUpdate) -> bool:
-    changed = update.id.original
-    return isinstance(changed, _CHANGING) and not is_ours(changed)
 
 
 def on_interruption(*_arguments: object) -> None:
@@ -300,6 +296,7 @@ def after_undo(*_arguments: object) -> None:
 
 def on_load(*_arguments: object) -> None:
     """Another file: its results are none of ours."""
+    stop()
     _done.clear()
     _seen.clear()
     _state.message = _state.view = ""
@@ -318,17 +315,4 @@ _HANDLERS = Handlers(
     load_pre=(on_interruption, on_load),
     load_post=lambda *_: watch() and None,
 )
-
-
-def register() -> None:
-    """Listen."""
-    auto_refine_switched.append(_switched)
-    _HANDLERS.register()
-
-
-def unregister() -> None:
-    """Stop, and listen no more."""
-    stop()
-    on_load()
-    _HANDLERS.unregister()
-    auto_refine_switched.remove(_switched)
+register, unregister = in_order(listening(_switched, auto_refine_switched), _HANDLERS, end=on_load)

@@ -36,7 +36,7 @@ from ...preview.running import InView, in_view, shown
 from ...refinement.loop import refine as refine_loop
 from ..job.contents import bind_steps, compile_for, in_year, load_for, memory_left, read_scene, refinement_settings
 from ..main_thread import on_main_thread
-from ..runtime import Handlers, JobData, call_off, call_soon, job, redraw
+from ..runtime import Handlers, JobData, call_off, call_soon, in_order, job, listening, redraw
 from ..scene.ages import crown_kinds, plainly_aged
 from ..scene.camera import read_camera, timeline_moves, views_of
 from ..scene.crowns import crown_for
@@ -244,11 +244,6 @@ def _moved(depsgraph: bpy.types.Depsgraph) -> bool:
     return any(not (isinstance(one, bpy.types.Object) and one.type in {'CAMERA', 'LIGHT'}) for one in changed)
 
 
-def _faces_of(flora: Flora, seeds: Seeds) -> Shapes:
-    """Plants as those are that look largest among very many."""
-    return with_faces(crowns_of(flora, seeds))
-
-
 def follow(
     scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, preview: Preview, views: Sequence[NDArray[np.float64]]
 ) -> None:
@@ -268,7 +263,7 @@ def follow(
         if running.seen is None or not np.array_equal(running.views, views):
             running.seen, running.views = in_view(running.seeds, views), views
         seen, others = running.seen, running.others
-        make = light_plants if len(running.seeds) <= MOST_FACES else _faces_of
+        make = light_plants if len(running.seeds) <= MOST_FACES else lambda *some: with_faces(crowns_of(*some))
         parts = [*_grown(scene, depsgraph, make, seen.seeds, seen), *others]
     except TetFloraError:  # which is told when all are read
         return
@@ -283,7 +278,7 @@ def _moment(scene: bpy.types.Scene) -> tuple:
     return season_of(scene), years_of(scene), stand_years(scene)
 
 
-def _on_load_pre(_path: object, _other: object = None) -> None:
+def _on_load_pre(*_: object) -> None:
     state.previews.clear()
     call_off(_on_timer)
 
@@ -306,20 +301,9 @@ _IN_WINDOW = Handlers(
 )
 
 
-def register() -> None:
-    """Listen to changes of plants where there is a window, and to loading in any case."""
-    _HANDLERS.register()
-    if not bpy.app.background:
-        _IN_WINDOW.register()
-    for listeners in (edits.listeners, state.listeners):
-        listeners.append(schedule)
-
-
-def unregister() -> None:
-    """Forget everything and stop listening."""
-    for listeners in (edits.listeners, state.listeners):
-        listeners.remove(schedule)
-    state.previews.clear()
-    call_off(_on_timer)
-    _IN_WINDOW.unregister()
-    _HANDLERS.unregister()
+register, unregister = in_order(
+    _HANDLERS,
+    *([] if bpy.app.background else [_IN_WINDOW]),
+    listening(schedule, edits.listeners, state.listeners),
+    end=_on_load_pre,
+)

@@ -6,7 +6,6 @@ Dots belong to the session and are forgotten when a file is loaded. The state ho
 do not outlive undo.
 """
 
-import time
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
@@ -19,11 +18,10 @@ from ...arrays import Floats, Floats32
 from ...camera.camera import origin_near
 from ...errors import TetFloraError
 from .. import compat
-from ..declare import once
 from ..placing import properties
 from ..placing.populations import own_objects
 from ..placing.rules import awaits_update, makes_field, read_search, shown_population
-from ..runtime import Handlers, call_off, call_soon, redraw, with_uid
+from ..runtime import Handlers, SceneSwitch, in_order, listening, redraw
 from ..species import edits
 
 Color = tuple[float, float, float, float]
@@ -57,39 +55,16 @@ class Dots:
 
 @dataclass
 class _State:
-    """The scene that shows a preview, and how the last placing went."""
+    """How the last placing went."""
 
-    scene: int | None = None  # its `session_uid`
     uid: str = ""
     dots: Dots | None = None
     error: str = ""
-    seconds: float = 0.0
     handle: object = None
     batch: object = field(default=None, repr=False)
 
 
 _state = _State()
-
-
-def shown_in(scene: bpy.types.Scene) -> bool:
-    """Whether the preview is switched on in a scene."""
-    return _state.scene == scene.session_uid
-
-
-def show(scene: bpy.types.Scene, on: bool) -> None:
-    """Switch the preview of a scene on or off; in the window it appears a moment later, in the background never."""
-    _state.scene = scene.session_uid if on else None
-    if on:
-        schedule()
-    else:
-        _clear()
-
-
-def schedule() -> None:
-    """Place dots anew soon; many changes in a row are one placing."""
-    if _state.scene is not None and not bpy.app.background:
-        # What takes long to place must not keep the window busy while a slider is dragged.
-        call_soon(_on_timer, max(_SOON, _state.seconds))
 
 
 def dots_of(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> Dots:
@@ -122,7 +97,7 @@ def dots_of(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> Dots:
 
 def status(population: bpy.types.PropertyGroup) -> str:
     """How many plants there are or will be, and as what; reads no geometry, so that panels may call it."""
-    dots = _state.dots if _state.scene is not None and population.uid == _state.uid else None
+    dots = _state.dots if switch.scene is not None and population.uid == _state.uid else None
     if dots is not None:
         number, known = dots.plants, not dots.more or population.by_density
     elif population.uid and not awaits_update(population):
@@ -142,25 +117,22 @@ def status(population: bpy.types.PropertyGroup) -> str:
 
 def complaints(population: bpy.types.PropertyGroup) -> list[str]:
     """What is wrong with a population, for the panel; reads no geometry."""
-    if _state.scene is not None and population.uid == _state.uid:
+    if switch.scene is not None and population.uid == _state.uid:
         text = _state.error or (_state.dots.message if _state.dots is not None else "")
     else:
         text = population.message
     return [text] if text else []
 
 
-def _on_timer() -> None:
-    scene = with_uid(bpy.data.scenes, _state.scene)
+def _place(scene: bpy.types.Scene | None) -> None:
     if scene is None or scene != bpy.context.scene:
         _clear()
         return
-    begin = time.perf_counter()
     try:
         dots = dots_of(scene, bpy.context.evaluated_depsgraph_get())
         _state.error = ""
     except TetFloraError as wrong:
         dots, _state.error = None, str(wrong)
-    _state.seconds = time.perf_counter() - begin
     _clear()
     _state.dots, _state.uid = dots, shown_population(scene).uid
     if dots is not None and len(dots.position):
@@ -170,7 +142,7 @@ def _on_timer() -> None:
 
 def _draw() -> None:
     context = bpy.context
-    if _state.dots is None or context.scene.session_uid != _state.scene or not context.space_data.overlay.show_overlays:
+    if _state.dots is None or not switch.shown_in(context.scene) or not context.space_data.overlay.show_overlays:
         return
     shader = gpu.shader.from_builtin(compat.dot_shader())
     if _state.batch is None:
@@ -192,38 +164,21 @@ def _clear() -> None:
     redraw()
 
 
-def _on_load_pre(_path: object, _other: object = None) -> None:
-    _state.scene = None
-    call_off(_on_timer)
-    _clear()
-
-
-_HANDLERS = Handlers(undo_post=lambda *_: schedule(), redo_post=lambda *_: schedule(), load_pre=_on_load_pre)
-
-
-def register() -> None:
-    """Listen to changes of populations and species, undo and loading."""
-    bpy.types.WindowManager.tetflora_points = once.boolean(
-        "Preview Points",
-        "Show a dot in the viewport for each plant that the active layer would place by its present settings, "
-        "colored by species, updated with every change. Creates no objects",
-        get=lambda _: bpy.context.scene is not None and shown_in(bpy.context.scene),
-        set=lambda _, on: show(bpy.context.scene, on),
-    )
-    properties.listeners.append(schedule)
-    edits.listeners.append(schedule)
-    _HANDLERS.register()
-
-
-def unregister() -> None:
-    """Take the dots and all that listens away."""
-    del bpy.types.WindowManager.tetflora_points
-    _state.scene = None
-    call_off(_on_timer)
-    _clear()
-    _HANDLERS.unregister()
-    edits.listeners.remove(schedule)
-    properties.listeners.remove(schedule)
+switch = SceneSwitch(
+    "tetflora_points",
+    "Preview Points",
+    "Show a dot in the viewport for each plant that the active layer would place by its present settings, "
+    "colored by species, updated with every change. Creates no objects",
+    _place,
+    _clear,
+    _SOON,
+    drawn=True,
+)
+schedule = switch.schedule
+_HANDLERS = Handlers(
+    undo_post=lambda *_: schedule(), redo_post=lambda *_: schedule(), load_pre=lambda *_: switch.forget()
+)
+register, unregister = in_order(switch, listening(schedule, properties.listeners, edits.listeners), _HANDLERS)
 
 
 class GroundCursor:

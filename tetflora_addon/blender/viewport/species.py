@@ -7,8 +7,7 @@ runtime data. They change without steps of undo, and undo keeps what is equal in
 datablocks that it frees: Blender would crash. So they are taken away before each undo and made anew after it.
 """
 
-import time
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import bpy
 
@@ -16,12 +15,11 @@ from ...compiled.flora import Flora, compile_species
 from ...errors import TetFloraError
 from ...growth.seeds import Seeds
 from ...species.species import Range
-from ..declare import once
 from ..job.contents import expected_polygons, in_year
 from ..job.plant_mesh import plant_mesh, plant_parts, single_seed
 from ..materials.nodes import is_ours, tag
 from ..results.leaf_objects import resolved_species
-from ..runtime import Handlers, call_off, call_soon, redraw, with_uid
+from ..runtime import Handlers, SceneSwitch, in_order, listening, redraw
 from ..species import edits
 from ..species.editor import present_species
 
@@ -31,56 +29,20 @@ MOST_POLYGONS = 150_000
 _SOON = 0.05  # seconds from a change to the rebuilding
 
 
-@dataclass
-class _State:
-    """The scene whose editor shows a preview, and how the last rebuilding went."""
-
-    scene: int | None = None  # its `session_uid`
-    message: str = ""
-    failed: bool = False
-    seconds: float = 0.0
-
-
-_state = _State()
-
-
-def shown_in(scene: bpy.types.Scene) -> bool:
-    """Whether the preview is switched on in a scene."""
-    return _state.scene == scene.session_uid
+_message: tuple[str, bool] = "", False
 
 
 def message() -> tuple[str, bool]:
-    """Text for the panel, and whether it is an error."""
-    return _state.message, _state.failed
+    """Text for the panel, and whether it is an error; of the scene that shows a preview."""
+    return _message if switch.scene is not None else ("", False)
 
 
-def show(scene: bpy.types.Scene, on: bool) -> None:
-    """Switch the preview of a scene on or off; in the window it appears a moment later."""
-    _remove()
-    _state.scene, _state.message, _state.failed = (scene.session_uid, "", False) if on else (None, "", False)
-    if on:
-        schedule()
-
-
-def schedule() -> None:
-    """Rebuild the preview soon; many changes in a row are one rebuilding."""
-    if _state.scene is not None:
-        _call_soon()
-
-
-def _call_soon() -> None:
-    # A large plant must not keep the window busy while a slider is dragged.
-    call_soon(refresh, max(_SOON, _state.seconds))
-
-
-def refresh() -> None:
+def _build(scene: bpy.types.Scene | None) -> None:
     """Build the preview anew, now; take it away if it is switched off."""
-    scene = with_uid(bpy.data.scenes, _state.scene)
+    global _message
     if scene is None:
-        _state.scene = None
-        _remove()
+        switch.forget()
         return
-    begin = time.perf_counter()
     editor = scene.tetflora.species_editor
     identifier = present_species(editor)
     try:
@@ -91,12 +53,11 @@ def refresh() -> None:
         flora = in_year(scene, flora)
         mesh = plant_mesh(scene, NAME, flora.species[0], plant_parts(flora, seeds))
     except TetFloraError as error:
-        _state.message, _state.failed = str(error), True
+        _message = str(error), True
         return  # the last plant that could be grown stays
     _place(scene, mesh)
-    _state.seconds = time.perf_counter() - begin
     cut = f" in the first {orders} orders; the others are omitted to keep the preview interactive" if orders else ""
-    _state.message, _state.failed = f"{len(mesh.polygons):,} polygons{cut}", False
+    _message = f"{len(mesh.polygons):,} polygons{cut}", False
     redraw()
 
 
@@ -152,43 +113,30 @@ def _remove() -> None:
 def _before_undo(_scene: bpy.types.Scene, _other: object = None) -> None:
     if _objects() or _collections():
         _remove()
-        _call_soon()
+        switch.look()
 
 
 def _on_undo(_scene: bpy.types.Scene, _other: object = None) -> None:
     # Undo may also bring back a preview that was switched off since.
-    if _state.scene is not None or _objects():
-        _call_soon()
+    if switch.scene is not None or _objects():
+        switch.look()
 
 
-def _on_load_pre(_path: object, _other: object = None) -> None:
-    _state.scene = None
-    call_off(refresh)
-
-
-_HANDLERS = Handlers(
-    undo_pre=_before_undo, redo_pre=_before_undo, undo_post=_on_undo, redo_post=_on_undo, load_pre=_on_load_pre
+switch = SceneSwitch(
+    "tetflora_species",
+    "Preview",
+    "Show one plant of the species in the editor at the 3D cursor, updated with every change. It is never "
+    "rendered or saved",
+    _build,
+    _remove,
+    _SOON,
+    drawn=False,
 )
-
-
-def register() -> None:
-    """Listen to changes of species, undo and loading."""
-    bpy.types.WindowManager.tetflora_species = once.boolean(
-        "Preview",
-        "Show one plant of the species in the editor at the 3D cursor, updated with every change. It is never "
-        "rendered or saved",
-        get=lambda _: bpy.context.scene is not None and shown_in(bpy.context.scene),
-        set=lambda _, on: show(bpy.context.scene, on),
-    )
-    edits.listeners.append(schedule)
-    _HANDLERS.register()
-
-
-def unregister() -> None:
-    """Take the preview and all that listens away."""
-    del bpy.types.WindowManager.tetflora_species
-    _remove()
-    _state.scene = None
-    call_off(refresh)
-    _HANDLERS.unregister()
-    edits.listeners.remove(schedule)
+_HANDLERS = Handlers(
+    undo_pre=_before_undo,
+    redo_pre=_before_undo,
+    undo_post=_on_undo,
+    redo_post=_on_undo,
+    load_pre=lambda *_: switch.forget(),
+)
+register, unregister = in_order(switch, listening(switch.schedule, edits.listeners), _HANDLERS)
