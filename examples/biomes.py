@@ -43,6 +43,8 @@ SMALL, LARGEST = (320, 200), 20_000
 _LAND, _WOOD = 460.0, 260.0
 #: Fraction below which space counts as hidden: through grass one sees far.
 _HIDDEN = 0.004
+#: Sine of the height of the sun that lights land far away, about the middle of the views.
+_SUN = 0.67
 
 
 @dataclass(frozen=True)
@@ -195,16 +197,20 @@ def _covers(scene: bpy.types.Scene) -> Iterator[tuple[Any, list[Any]]]:
 
 
 def _from_afar(scene: bpy.types.Scene, land: bpy.types.Object) -> list[float]:
-    """Mean color of the land with what covers it, linear RGB: as land of which nobody sees the blades."""
-    from tetflora_addon.blender.materials.soil import SHADED
+    """Mean color of the land with what covers it, linear RGB: as land of which nobody sees the blades.
 
+    A deep layer of leaves shades itself: what it returns follows from the albedo of one leaf by the two-stream
+    approximation (J. A. Coakley and P. Chylek, Journal of the Atmospheric Sciences 32, 1975).
+    """
     hidden, color = 0.0, np.zeros(3)
     for read, crowns in _covers(scene):
         seen = np.array([crown.seen for crown in crowns])[read.species] * read.scale**2
         hidden += seen.sum()
         color += seen @ np.array([crown.color for crown in crowns])[read.species]
+    absorbed = np.sqrt(1.0 - color / max(hidden, 1e-9))
+    layer = (1.0 - absorbed) / (1.0 + 2.0 * _SUN * absorbed)
     bare = np.exp(-hidden / (land.dimensions.x * land.dimensions.y))
-    return (bare * np.array(_mean(land)) + (1.0 - bare) * SHADED * color / max(hidden, 1e-9)).tolist()
+    return (bare * np.array(_mean(land)) + (1.0 - bare) * layer).tolist()
 
 
 def _clear(scene: bpy.types.Scene, view: View) -> tuple[float, float, float]:
