@@ -10,8 +10,13 @@ Cycles renders what arrives from above at a dark plane at the height of the eye,
 sun and sky, bounces included, mean of red, green and blue, which stands for photosynthetically active light. *Expanded*
 are all leaves of the square, as instances in its copies; *refined* is what the same plants become for a camera that
 stands on the plane and looks ahead. ``model`` is the light that seedlings have there in the simulation. Each is
-measured in a process of its own. Published ranges and their sources are in ``tests/data/light_inside.json``; what is
-within ``tolerance`` beyond their ends is in range.
+measured in a process of its own. Published ranges are in ``tests/data/light_inside.json``; what is within ``tolerance``
+beyond their ends is in range. Their sources, there beside each: for beech and oak M. Hagemeier and C. Leuschner
+(Forests, 2019), for spruce T. Johansson (Forest Ecology and Management, 1987), for Scots pine J.-M. N. Walter and
+C. G. Himmler (Canadian Journal of Forest Research, 1996).
+
+A square that is small for want of memory has few trees, and its leaf area varies: of `SEEDS` stands that is shown whose
+leaf area is nearest to that of a `LARGE` one.
 """
 
 from __future__ import annotations
@@ -34,8 +39,8 @@ from tetflora_addon.blender.placing.first_forest import sky
 from tetflora_addon.blender.results.output import result_collections
 from tetflora_addon.blender.scene.fields import OFFSET, SIZE_ATTRIBUTES, write_field
 from tetflora_addon.species.catalog import load_species
-from tetflora_addon.stands.grow import Records, StandSettings, begun
-from tetflora_addon.stands.site import StandSite, StandSpecies, StandTraits
+from tetflora_addon.stands.grow import GrowingStand, Records, StandSettings, begun
+from tetflora_addon.stands.site import StandSite, StandSpecies
 
 from .pictures import read_picture, render, timed_refine
 from .report import ROOT, Targets, peak_mb, records_of
@@ -45,6 +50,8 @@ QUICK_WOODS = ("scots_pine",)
 #: Side of the square that grows, meters, and of those whose leaves would not fit into memory; how far copies of it
 #: reach on all sides; height of the plane.
 SIDE, SMALLER, REACH, EYE = 24.0, {"spruce": 16.0}, 72.0, 1.7
+#: Stands of which one is taken where the square is smaller; side of the one that it is compared with, meters.
+SEEDS, LARGE = 4, 60.0
 #: Plants on a hectare at the beginning, as in a new stand; elevation of the sun at noon, degrees.
 DENSITY, ELEVATION = 2500.0, 60.0
 PIXELS, SAMPLES, QUICK_SAMPLES = 96, 64, 16
@@ -145,18 +152,33 @@ def measure(name: str, way: str, quick: bool, picture: Path | None = None) -> di
 
 def wood(name: str, years: int, side: float) -> tuple[Records, float, float]:
     """Plants of a grown stand around the origin, light at the height of the eye in the simulation, leaf area index."""
-    member, cells = StandSpecies(load_species(name)), round(side / 4.0)
-    site = StandSite(-side / 2.0, -side / 2.0, side / cells, np.zeros((cells, cells)))
-    stand = begun(site, [member], StandSettings(density=DENSITY, recruits=0.0, years=years, interval=0))
-    for year in range(years):
-        stand.step(year)
-    plants, traits = stand.plants, StandTraits([member])
-    crowns = plants.crowns(traits)
-    stand.light.fill(crowns)
+    seed = 0
+    if name in SMALLER:
+        usual = leaf_area_index(grown(name, years, LARGE, 0))
+        seed = min(range(SEEDS), key=lambda n: abs(leaf_area_index(grown(name, years, side, n)) - usual))
+    stand = grown(name, years, side, seed)
+    stand.light.fill(stand.plants.crowns(stand.traits))
     place = np.arange(0.5, side, 1.0)
     x, y = (axis.ravel() for axis in np.meshgrid(place, place))
     light = float(stand.light.at(x, y, np.full(len(x), EYE)).mean())
-    return plants.records(years, traits, site), light, float(crowns.leaves.sum() / traits.extinction[0] / side**2)
+    return stand.plants.records(years, stand.traits, stand.site), light, leaf_area_index(stand)
+
+
+def grown(name: str, years: int, side: float, seed: int) -> GrowingStand:
+    """A stand of one species on a square around the origin after so many years."""
+    member, cells = StandSpecies(load_species(name)), round(side / 4.0)
+    site = StandSite(-side / 2.0, -side / 2.0, side / cells, np.zeros((cells, cells)))
+    settings = StandSettings(density=DENSITY, recruits=0.0, years=years, interval=0, seed=seed)
+    stand = begun(site, [member], settings)
+    for year in range(years):
+        stand.step(year)
+    return stand
+
+
+def leaf_area_index(stand: GrowingStand) -> float:
+    """One-sided leaf area of a stand of one species over that of its ground."""
+    width, depth = stand.site.size
+    return float(stand.plants.crowns(stand.traits).leaves.sum() / stand.traits.extinction[0] / (width * depth))
 
 
 def planted(name: str, records: Records, places: NDArray[np.float64]) -> bpy.types.Object:
