@@ -15,8 +15,8 @@ beyond their ends is in range. Their sources, there beside each: for beech and o
 (Forests, 2019), for spruce T. Johansson (Forest Ecology and Management, 1987), for Scots pine J.-M. N. Walter and
 C. G. Himmler (Canadian Journal of Forest Research, 1996).
 
-A square that is small for want of memory has few trees, and its leaf area varies: of `SEEDS` stands that is shown whose
-leaf area is nearest to that of a `LARGE` one.
+A square that is small for want of memory has few trees, and the light varies from stand to stand: it is the mean of
+`SQUARES`.
 """
 
 from __future__ import annotations
@@ -39,8 +39,8 @@ from tetflora_addon.blender.placing.first_forest import sky
 from tetflora_addon.blender.results.output import result_collections
 from tetflora_addon.blender.scene.fields import OFFSET, SIZE_ATTRIBUTES, write_field
 from tetflora_addon.species.catalog import load_species
-from tetflora_addon.stands.grow import GrowingStand, Records, StandSettings, begun
-from tetflora_addon.stands.site import StandSite, StandSpecies
+from tetflora_addon.stands.grow import Records, StandSettings, begun
+from tetflora_addon.stands.site import StandSite, StandSpecies, StandTraits
 
 from .pictures import read_picture, render, timed_refine
 from .report import ROOT, Targets, peak_mb, records_of
@@ -50,8 +50,8 @@ QUICK_WOODS = ("scots_pine",)
 #: Side of the square that grows, meters, and of those whose leaves would not fit into memory; how far copies of it
 #: reach on all sides; height of the plane.
 SIDE, SMALLER, REACH, EYE = 24.0, {"spruce": 16.0}, 72.0, 1.7
-#: Stands of which one is taken where the square is smaller; side of the one that it is compared with, meters.
-SEEDS, LARGE = 4, 60.0
+#: Stands of which the mean is taken where the square is smaller.
+SQUARES = 4
 #: Plants on a hectare at the beginning, as in a new stand; elevation of the sun at noon, degrees.
 DENSITY, ELEVATION = 2500.0, 60.0
 PIXELS, SAMPLES, QUICK_SAMPLES = 96, 64, 16
@@ -98,13 +98,20 @@ def published() -> dict[str, Any]:
     return json.loads(DATA.read_text(encoding="utf-8"))
 
 
-def measure(name: str, way: str, quick: bool, picture: Path | None = None) -> dict[str, float | str]:
+def measure(name: str, way: str, quick: bool, picture: Path | None = None) -> dict[str, Any]:
     """Light under a wood over that in the open, of plants that are expanded or refined; what the simulation has."""
+    found = [square(name, way, quick, seed, picture) for seed in range(SQUARES if name in SMALLER else 1)]
+    means = {key: float(np.mean([one[key] for one in found])) for key in found[0]}
+    return {"species": name, **means, "each": [round(one[way], 4) for one in found]}
+
+
+def square(name: str, way: str, quick: bool, seed: int, picture: Path | None = None) -> dict[str, float]:
+    """What is measured of one stand."""
     scene, years = bpy.context.scene, published()["woods"][name]["years"]
     for obj in list(scene.objects):
         bpy.data.objects.remove(obj)
     side = SMALLER.get(name, SIDE)
-    records, model, leaves = wood(name, years, side)
+    records, model, leaves = wood(name, years, side, seed)
     around = np.arange(-round(REACH / side), round(REACH / side) + 1)
     places = side * np.stack(np.meshgrid(around, around), axis=-1).reshape(-1, 2)
     field = planted(name, records, np.zeros((1, 2)) if way == "expanded" else places)
@@ -136,7 +143,6 @@ def measure(name: str, way: str, quick: bool, picture: Path | None = None) -> di
         open_ = arriving(scene, Path(folder) / "open.exr", samples)
     tall = records.height > 0.5 * records.height.max()
     return {
-        "species": name,
         "years": years,
         "stems": float(tall.sum() / side**2 * 1e4),
         "height": float(records.height[tall].mean()),
@@ -150,35 +156,21 @@ def measure(name: str, way: str, quick: bool, picture: Path | None = None) -> di
     }
 
 
-def wood(name: str, years: int, side: float) -> tuple[Records, float, float]:
+def wood(name: str, years: int, side: float, seed: int) -> tuple[Records, float, float]:
     """Plants of a grown stand around the origin, light at the height of the eye in the simulation, leaf area index."""
-    seed = 0
-    if name in SMALLER:
-        usual = leaf_area_index(grown(name, years, LARGE, 0))
-        seed = min(range(SEEDS), key=lambda n: abs(leaf_area_index(grown(name, years, side, n)) - usual))
-    stand = grown(name, years, side, seed)
-    stand.light.fill(stand.plants.crowns(stand.traits))
-    place = np.arange(0.5, side, 1.0)
-    x, y = (axis.ravel() for axis in np.meshgrid(place, place))
-    light = float(stand.light.at(x, y, np.full(len(x), EYE)).mean())
-    return stand.plants.records(years, stand.traits, stand.site), light, leaf_area_index(stand)
-
-
-def grown(name: str, years: int, side: float, seed: int) -> GrowingStand:
-    """A stand of one species on a square around the origin after so many years."""
     member, cells = StandSpecies(load_species(name)), round(side / 4.0)
     site = StandSite(-side / 2.0, -side / 2.0, side / cells, np.zeros((cells, cells)))
     settings = StandSettings(density=DENSITY, recruits=0.0, years=years, interval=0, seed=seed)
     stand = begun(site, [member], settings)
     for year in range(years):
         stand.step(year)
-    return stand
-
-
-def leaf_area_index(stand: GrowingStand) -> float:
-    """One-sided leaf area of a stand of one species over that of its ground."""
-    width, depth = stand.site.size
-    return float(stand.plants.crowns(stand.traits).leaves.sum() / stand.traits.extinction[0] / (width * depth))
+    plants, traits = stand.plants, StandTraits([member])
+    crowns = plants.crowns(traits)
+    stand.light.fill(crowns)
+    place = np.arange(0.5, side, 1.0)
+    x, y = (axis.ravel() for axis in np.meshgrid(place, place))
+    light = float(stand.light.at(x, y, np.full(len(x), EYE)).mean())
+    return plants.records(years, traits, site), light, float(crowns.leaves.sum() / traits.extinction[0] / side**2)
 
 
 def planted(name: str, records: Records, places: NDArray[np.float64]) -> bpy.types.Object:

@@ -39,8 +39,8 @@ SIZE, SAMPLES = (480, 300), 48
 CELL, COLUMNS, SHEETS = 330, 4, {"summer": "biomes.jpg", "winter": "biomes_winter.jpg"}
 #: Pictures for menus: pixels, and bytes at most.
 SMALL, LARGEST = (320, 200), 20_000
-#: Side of all land, meters, of open land and of woods, in which one does not see as far.
-_LAND, _WOOD = 460.0, 260.0
+#: Side of all land, meters.
+_LAND = 460.0
 #: Fraction below which space counts as hidden: through grass one sees far.
 _HIDDEN = 0.004
 #: Sine of the height of the sun that lights land far away, about the middle of the views.
@@ -71,8 +71,6 @@ class View:
         Of a brook in the valley, meters over its bed; 0 for none.
     snow : bool
         Whether winter brings it.
-    land : float
-        Side of the land, meters.
     """
 
     eye: tuple[float, float, float] = (0.0, -42.0, 1.65)
@@ -88,18 +86,15 @@ class View:
     beside: str = ""
     water: float = 0.0
     snow: bool = True
-    land: float = _LAND
 
 
 _COOL, _GOLD = (1.0, 0.95, 0.88), (1.0, 0.86, 0.66)
 _CLEAR = (0.0002, (0.4, 0.5, 0.5))
 VIEWS = {
     "alpine_treeline": View((-34.0, -26.0, 1.8), (18.0, 2.0, 3.0), 24.0, (38.0, 215.0), gray=0.42, clouds=0.6),
-    "beech_fern": View(
-        (0.0, -40.0, 1.6), (0.0, 0.0, 3.5), 26.0, (56.0, 215.0), gray=0.42, haze=_CLEAR, light=2.2, land=_WOOD
-    ),
+    "beech_fern": View((0.0, -40.0, 1.6), (0.0, 0.0, 3.5), 26.0, (56.0, 215.0), gray=0.42, haze=_CLEAR, light=2.2),
     "birch_pine": View((0.0, -42.0, 1.6), (4.0, 0.0, 4.6), 26.0, (36.0, 240.0), _GOLD, gray=0.38),
-    "dead_forest": View((0.0, -42.0, 1.6), (-3.0, 0.0, 4.5), 26.0, (32.0, 245.0), gray=0.38, clouds=0.8, land=_WOOD),
+    "dead_forest": View((0.0, -42.0, 1.6), (-3.0, 0.0, 4.5), 26.0, (32.0, 245.0), gray=0.38, clouds=0.8),
     "hedgerow": View((-45.0, -12.0, 1.75), (0.0, 1.0, 2.4), 28.0, (34.0, 200.0), _COOL, gray=0.42, beside="meadow"),
     "meadow": View((0.0, -44.0, 1.5), (4.0, 0.0, 1.7), 34.0, (42.0, 245.0), gray=0.44),
     "mediterranean_scrub": View(
@@ -116,11 +111,8 @@ VIEWS = {
         free=7.0,
         beside="meadow",
         water=0.3,
-        land=_WOOD,
     ),
-    "spruce_forest": View(
-        (0.0, -40.0, 1.6), (0.0, 0.0, 3.8), 26.0, (54.0, 215.0), gray=0.3, haze=_CLEAR, free=5.0, land=_WOOD
-    ),
+    "spruce_forest": View((0.0, -40.0, 1.6), (0.0, 0.0, 3.8), 26.0, (54.0, 215.0), gray=0.3, haze=_CLEAR, free=5.0),
     "tropical_understory": View(
         (0.0, -38.0, 1.6),
         (0.0, 0.0, 4.2),
@@ -130,7 +122,6 @@ VIEWS = {
         haze=_CLEAR,
         light=2.0,
         snow=False,
-        land=_WOOD,
     ),
 }
 #: Names of the two cameras, and the height of winter's sun at most, degrees.
@@ -158,7 +149,7 @@ def build(identifier: str, view: View) -> None:
         other = files.read_biome(SHIPPED / f"{view.beside}.json")
         _add(run_to_end, adding, scene, replace(other, layers=[o for o in other.layers if o["kind"] == "cover"]), land)
     added = _add(run_to_end, adding, scene, biome, land)
-    around = _around(biome, adding, view.land)
+    around = _around(biome, adding)
     scene.collection.objects.link(around)
     tall = [layer for layer in biome.layers if layer["kind"] != "cover"]
     if tall:
@@ -248,9 +239,9 @@ def _add(run_to_end, adding, scene, biome, land):
     return run_to_end(adding.add_biome_steps(scene, bpy.context.evaluated_depsgraph_get(), biome, [land]))
 
 
-def _around(biome: object, adding: object, side: float) -> bpy.types.Object:
+def _around(biome: object, adding: object) -> bpy.types.Object:
     """The same land around the hectare, with the same corners along its border: nothing shows between the two."""
-    mesh, _, _ = grid("Ground", side, adding.STEP, adding.SIDE, lambda x, y: adding.heights(x, y, biome.ground))
+    mesh, _, _ = grid("Ground", _LAND, adding.STEP, adding.SIDE, lambda x, y: adding.heights(x, y, biome.ground))
     around = bpy.data.objects.new("Ground", mesh)
     around.tetflora.is_occluder = True
     return around
@@ -260,7 +251,7 @@ def _brook(scene: bpy.types.Scene, adding: object, biome: object, view: View) ->
     """Water in the bed of a valley, which falls as the bed does."""
     from tetflora_addon.blender.compat import shader_tree
 
-    along = np.linspace(-0.5 * view.land, 0.5 * view.land, 300)
+    along = np.linspace(-0.5 * _LAND, 0.5 * _LAND, 300)
     middle = adding.brook(along)
     bed = adding.heights(along, middle, biome.ground) + view.water
     points = np.concatenate([np.stack([along, middle + side, bed], axis=1) for side in (-4.0, 4.0)])
