@@ -43,6 +43,8 @@ SMALL, LARGEST = (320, 200), 20_000
 _LAND = 460.0
 #: Fraction below which space counts as hidden: through grass one sees far.
 _HIDDEN = 0.004
+#: How much of soil is hidden where it is green, as its material has it.
+_GREEN = 0.85
 #: Sine of the height of the sun that lights land far away, about the middle of the views.
 _SUN = 0.67
 
@@ -268,12 +270,14 @@ def _brook(scene: bpy.types.Scene, adding: object, biome: object, view: View) ->
 
 
 def _mean(land: bpy.types.Object) -> list[float]:
-    """Mean color of a land's soil, linear RGB."""
-    image = land.data.materials[0].node_tree.nodes["Soil Map"].image
+    """Mean color of a land's soil with the green on it, linear RGB."""
+    nodes = land.data.materials[0].node_tree.nodes
+    image, tint = nodes["Soil Map"].image, np.array(nodes["Soil Green"].outputs[0].default_value[:3])
     pixels = np.zeros(4 * image.size[0] * image.size[1], np.float32)
     image.pixels.foreach_get(pixels)
-    shown = pixels.reshape(-1, 4)[:, :3].astype(np.float64)
-    return (np.where(shown <= 0.04045, shown / 12.92, ((shown + 0.055) / 1.055) ** 2.4)).mean(axis=0).tolist()
+    shown, green = np.split(pixels.reshape(-1, 4).astype(np.float64), [3], axis=1)
+    soil = np.where(shown <= 0.04045, shown / 12.92, ((shown + 0.055) / 1.055) ** 2.4)
+    return (soil + _GREEN * green * (tint - soil)).mean(axis=0).tolist()
 
 
 def dress(scene: bpy.types.Scene, view: View, camera: str, season: str) -> float:
