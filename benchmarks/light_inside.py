@@ -10,8 +10,13 @@ Cycles renders what arrives from above at a dark plane at the height of the eye,
 sun and sky, bounces included, mean of red, green and blue, which stands for photosynthetically active light. *Expanded*
 are all leaves of the square, as instances in its copies; *refined* is what the same plants become for a camera that
 stands on the plane and looks ahead. ``model`` is the light that seedlings have there in the simulation. Each is
-measured in a process of its own. Published ranges and their sources are in ``tests/data/light_inside.json``; what is
-within ``tolerance`` beyond their ends is in range.
+measured in a process of its own. Published ranges are in ``tests/data/light_inside.json``; what is within ``tolerance``
+beyond their ends is in range. Their sources, there beside each: for beech and oak M. Hagemeier and C. Leuschner
+(Forests, 2019), for spruce T. Johansson (Forest Ecology and Management, 1987), for Scots pine J.-M. N. Walter and
+C. G. Himmler (Canadian Journal of Forest Research, 1996).
+
+A square that is small for want of memory has few trees, and the light varies from stand to stand: it is the mean of
+`SQUARES`.
 """
 
 from __future__ import annotations
@@ -45,6 +50,8 @@ QUICK_WOODS = ("scots_pine",)
 #: Side of the square that grows, meters, and of those whose leaves would not fit into memory; how far copies of it
 #: reach on all sides; height of the plane.
 SIDE, SMALLER, REACH, EYE = 24.0, {"spruce": 16.0}, 72.0, 1.7
+#: Stands of which the mean is taken where the square is smaller.
+SQUARES = 4
 #: Plants on a hectare at the beginning, as in a new stand; elevation of the sun at noon, degrees.
 DENSITY, ELEVATION = 2500.0, 60.0
 PIXELS, SAMPLES, QUICK_SAMPLES = 96, 64, 16
@@ -91,13 +98,20 @@ def published() -> dict[str, Any]:
     return json.loads(DATA.read_text(encoding="utf-8"))
 
 
-def measure(name: str, way: str, quick: bool, picture: Path | None = None) -> dict[str, float | str]:
+def measure(name: str, way: str, quick: bool, picture: Path | None = None) -> dict[str, Any]:
     """Light under a wood over that in the open, of plants that are expanded or refined; what the simulation has."""
+    found = [square(name, way, quick, seed, picture) for seed in range(SQUARES if name in SMALLER else 1)]
+    means = {key: float(np.mean([one[key] for one in found])) for key in found[0]}
+    return {"species": name, **means, "each": [round(one[way], 4) for one in found]}
+
+
+def square(name: str, way: str, quick: bool, seed: int, picture: Path | None = None) -> dict[str, float]:
+    """What is measured of one stand."""
     scene, years = bpy.context.scene, published()["woods"][name]["years"]
     for obj in list(scene.objects):
         bpy.data.objects.remove(obj)
     side = SMALLER.get(name, SIDE)
-    records, model, leaves = wood(name, years, side)
+    records, model, leaves = wood(name, years, side, seed)
     around = np.arange(-round(REACH / side), round(REACH / side) + 1)
     places = side * np.stack(np.meshgrid(around, around), axis=-1).reshape(-1, 2)
     field = planted(name, records, np.zeros((1, 2)) if way == "expanded" else places)
@@ -129,7 +143,6 @@ def measure(name: str, way: str, quick: bool, picture: Path | None = None) -> di
         open_ = arriving(scene, Path(folder) / "open.exr", samples)
     tall = records.height > 0.5 * records.height.max()
     return {
-        "species": name,
         "years": years,
         "stems": float(tall.sum() / side**2 * 1e4),
         "height": float(records.height[tall].mean()),
@@ -143,11 +156,12 @@ def measure(name: str, way: str, quick: bool, picture: Path | None = None) -> di
     }
 
 
-def wood(name: str, years: int, side: float) -> tuple[Records, float, float]:
+def wood(name: str, years: int, side: float, seed: int) -> tuple[Records, float, float]:
     """Plants of a grown stand around the origin, light at the height of the eye in the simulation, leaf area index."""
     member, cells = StandSpecies(load_species(name)), round(side / 4.0)
     site = StandSite(-side / 2.0, -side / 2.0, side / cells, np.zeros((cells, cells)))
-    stand = begun(site, [member], StandSettings(density=DENSITY, recruits=0.0, years=years, interval=0))
+    settings = StandSettings(density=DENSITY, recruits=0.0, years=years, interval=0, seed=seed)
+    stand = begun(site, [member], settings)
     for year in range(years):
         stand.step(year)
     plants, traits = stand.plants, StandTraits([member])

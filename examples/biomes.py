@@ -1,8 +1,8 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The shipped biomes, each on a hectare of its own land and seen at eye height.
+"""The shipped biomes, each on a hectare of its own land: at eye height and from above, in summer and in winter.
 
-    python -m examples.biomes                        # docs/images/biomes.jpg, from pictures that are in out/biomes
+    python -m examples.biomes                        # docs/images/biomes*.jpg, from pictures that are in out/biomes
     python -m examples.biomes beech_fern meadow      # renders these into out/biomes first
     python -m examples.biomes --all --pictures       # all of them, and their small pictures for menus
 
@@ -14,8 +14,10 @@ from __future__ import annotations
 import argparse
 import json
 import sys
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import bpy
 import numpy as np
@@ -27,18 +29,24 @@ from devtools import session
 from . import stage
 from .close_ups import render
 from .paper.pictures import save_sheet
-from .seasons import LOOKS, Look, Rgb, sky
+from .seasons import LOOKS, Rgb, sky
 from .wood import grid
 
 ROOT = Path(__file__).resolve().parent.parent
 SHIPPED = ROOT / "tetflora_addon" / "biomes"
-SIZE, SAMPLES, COLUMNS = (480, 300), 48, 3
+SIZE, SAMPLES = (480, 300), 48
+#: Of the sheets: pixels of a picture, pictures in a row, and files by season.
+CELL, COLUMNS, SHEETS = 330, 4, {"summer": "biomes.jpg", "winter": "biomes_winter.jpg"}
 #: Pictures for menus: pixels, and bytes at most.
 SMALL, LARGEST = (320, 200), 20_000
 #: Side of all land, meters.
 _LAND = 460.0
 #: Fraction below which space counts as hidden: through grass one sees far.
 _HIDDEN = 0.004
+#: How much of soil is hidden where it is green, as its material has it.
+_GREEN = 0.85
+#: Sine of the height of the sun that lights land far away, about the middle of the views.
+_SUN = 0.67
 
 
 @dataclass(frozen=True)
@@ -63,6 +71,8 @@ class View:
         A biome whose low plants cover the ground that this one leaves.
     water : float
         Of a brook in the valley, meters over its bed; 0 for none.
+    snow : bool
+        Whether winter brings it.
     """
 
     eye: tuple[float, float, float] = (0.0, -42.0, 1.65)
@@ -77,6 +87,7 @@ class View:
     free: float = 6.0
     beside: str = ""
     water: float = 0.0
+    snow: bool = True
 
 
 _COOL, _GOLD = (1.0, 0.95, 0.88), (1.0, 0.86, 0.66)
@@ -88,19 +99,38 @@ VIEWS = {
     "dead_forest": View((0.0, -42.0, 1.6), (-3.0, 0.0, 4.5), 26.0, (32.0, 245.0), gray=0.38, clouds=0.8),
     "hedgerow": View((-45.0, -12.0, 1.75), (0.0, 1.0, 2.4), 28.0, (34.0, 200.0), _COOL, gray=0.42, beside="meadow"),
     "meadow": View((0.0, -44.0, 1.5), (4.0, 0.0, 1.7), 34.0, (42.0, 245.0), gray=0.44),
-    "mediterranean_scrub": View((0.0, -44.0, 1.7), (2.0, 0.0, 2.2), 28.0, (46.0, 240.0), _COOL, gray=0.44, clouds=0.3),
+    "mediterranean_scrub": View(
+        (0.0, -44.0, 1.7), (2.0, 0.0, 2.2), 28.0, (46.0, 240.0), _COOL, gray=0.44, clouds=0.3, snow=False
+    ),
     "oak_savanna": View((0.0, -46.0, 1.9), (2.0, 0.0, 3.0), 34.0, (24.0, 245.0), _GOLD, gray=0.42),
     "park": View((0.0, -46.0, 1.65), (0.0, 0.0, 4.0), 28.0, (40.0, 240.0), gray=0.42),
     "riparian_willow": View(
-        (44.0, -12.0, 2.2), (8.0, 4.0, 3.2), 24.0, (44.0, 200.0), gray=0.42, free=7.0, beside="meadow", water=0.3
+        (44.0, -12.0, 2.2),
+        (8.0, 4.0, 3.2),
+        24.0,
+        (44.0, 200.0),
+        gray=0.42,
+        free=7.0,
+        beside="meadow",
+        water=0.3,
     ),
-    "spruce_forest": View(
-        (0.0, -40.0, 1.6), (0.0, 0.0, 3.8), 26.0, (54.0, 215.0), gray=0.3, haze=_CLEAR, light=1.0, free=5.0
-    ),
+    "spruce_forest": View((0.0, -40.0, 1.6), (0.0, 0.0, 3.8), 26.0, (54.0, 215.0), gray=0.3, haze=_CLEAR, free=5.0),
     "tropical_understory": View(
-        (0.0, -38.0, 1.6), (0.0, 0.0, 4.2), 24.0, (62.0, 220.0), gray=0.42, haze=_CLEAR, light=2.0, free=6.0
+        (0.0, -38.0, 1.6),
+        (0.0, 0.0, 4.2),
+        24.0,
+        (62.0, 220.0),
+        gray=0.42,
+        haze=_CLEAR,
+        light=2.0,
+        snow=False,
     ),
 }
+#: Names of the two cameras, and the height of winter's sun at most, degrees.
+EYE, FROM_ABOVE = CAMERAS = "Eye", "From Above"
+WINTER_SUN = 16.0
+#: From where all of the hectare is seen from above, as `View.eye` and `View.ahead`, its lens and the exposure's mean.
+ABOVE, BELOW, ABOVE_LENS, ABOVE_GRAY = (0.0, -95.0, 105.0), (0.0, 0.0, 0.0), 38.0, 0.4
 
 
 #: The picture of the README: the wood of birches and pines against a low sun.
@@ -125,38 +155,65 @@ def build(identifier: str, view: View) -> None:
     scene.collection.objects.link(around)
     tall = [layer for layer in biome.layers if layer["kind"] != "cover"]
     if tall:
-        far = replace(biome, layers=tall, ground={**biome.ground, "earth": _mean(land)}, species=biome.species)
+        seen = {"earth": _from_afar(scene, land), "turf_share": 0.0}
+        far = replace(biome, layers=tall, ground={**biome.ground, **seen}, species=biome.species)
         _add(run_to_end, adding, scene, far, around)
     else:
         around.data.materials.append(land.data.materials[0])
     if view.beside:
         run_to_end(adding.plant_biome_steps(scene, bpy.context.evaluated_depsgraph_get(), biomes_in(scene)[0]))
     if view.water:
-        _brook(scene, adding, biome, view.water)
+        _brook(scene, adding, biome, view)
     print(identifier, ", ".join(f"{name} {number:,}" for name, number in added.layers), *added.bare, flush=True)
-    eye, ahead = (
-        Vector((x, y, z + float(adding.heights(np.array(x), np.array(y), biome.ground))))
-        for x, y, z in (_clear(scene, view), view.ahead)
-    )
-    stage.camera(scene, eye, ahead, lens=view.lens, near=0.05)
-    _light(scene, view, around)
-    scene.tetflora.hidden = _HIDDEN
+    around.name, scene.tetflora.hidden = "Ground", _HIDDEN
+
+    def on_land(place: tuple[float, float, float]) -> Vector:
+        return Vector((*place[:2], place[2] + float(adding.heights(*np.array(place[:2]), biome.ground))))
+
+    stage.camera(scene, on_land(_clear(scene, view)), on_land(view.ahead), lens=view.lens, near=0.05).name = EYE
+    above = on_land((*BELOW[:2], ABOVE[2])) + Vector((*ABOVE[:2], 0.0))
+    stage.camera(scene, above, on_land(BELOW), lens=ABOVE_LENS).name = FROM_ABOVE
 
 
-def _clear(scene: bpy.types.Scene, view: View) -> tuple[float, float, float]:
-    """The place nearest to that of a view from which no plant stands close in the picture."""
+def _covers(scene: bpy.types.Scene) -> Iterator[tuple[Any, list[Any]]]:
+    """Plants of covers as `Seeds`, and the `Crown` of each of their species."""
     from tetflora_addon.blender.attributes import world_matrix
-    from tetflora_addon.blender.placing.canopy import canopy_of, is_cover
+    from tetflora_addon.blender.placing.canopy import is_cover
     from tetflora_addon.blender.scene.crowns import crown_for
     from tetflora_addon.blender.scene.fields import fields_of, read_field
 
     depsgraph = bpy.context.evaluated_depsgraph_get()
-    canopy, _ = canopy_of(scene, depsgraph)
-    plants, reach = [canopy.position[:, :2]], [view.free + 0.3 * canopy.radius]
     covers = {population.uid for population in scene.tetflora.layers if is_cover(population)}
     for field in fields_of([obj for obj in scene.objects if obj.tetflora.population in covers]):
         read = read_field(field, depsgraph, world_matrix(field, depsgraph)[None])
-        high = np.array([crown_for(scene, kind).height for kind in read.identifiers])[read.species] * read.scale
+        yield read, [crown_for(scene, kind) for kind in read.identifiers]
+
+
+def _from_afar(scene: bpy.types.Scene, land: bpy.types.Object) -> list[float]:
+    """Mean color of the land with what covers it, linear RGB: as land of which nobody sees the blades.
+
+    A deep layer of leaves shades itself: what it returns follows from the albedo of one leaf by the two-stream
+    approximation (J. A. Coakley and P. Chylek, Journal of the Atmospheric Sciences 32, 1975).
+    """
+    hidden, color = 0.0, np.zeros(3)
+    for read, crowns in _covers(scene):
+        seen = np.array([crown.seen for crown in crowns])[read.species] * read.scale**2
+        hidden += seen.sum()
+        color += seen @ np.array([crown.color for crown in crowns])[read.species]
+    absorbed = np.sqrt(1.0 - color / max(hidden, 1e-9))
+    layer = (1.0 - absorbed) / (1.0 + 2.0 * _SUN * absorbed)
+    bare = np.exp(-hidden / (land.dimensions.x * land.dimensions.y))
+    return (bare * np.array(_mean(land)) + (1.0 - bare) * layer).tolist()
+
+
+def _clear(scene: bpy.types.Scene, view: View) -> tuple[float, float, float]:
+    """The place nearest to that of a view from which no plant stands close in the picture."""
+    from tetflora_addon.blender.placing.canopy import canopy_of
+
+    canopy, _ = canopy_of(scene, bpy.context.evaluated_depsgraph_get())
+    plants, reach = [canopy.position[:, :2]], [view.free + 0.3 * canopy.radius]
+    for read, crowns in _covers(scene):
+        high = np.array([crown.height for crown in crowns])[read.species] * read.scale
         plants.append(read.position[high > 0.3, :2])
         reach.append(2.2 * high[high > 0.3])
     plants, reach = np.concatenate(plants), np.concatenate(reach)
@@ -192,13 +249,13 @@ def _around(biome: object, adding: object) -> bpy.types.Object:
     return around
 
 
-def _brook(scene: bpy.types.Scene, adding: object, biome: object, deep: float) -> None:
+def _brook(scene: bpy.types.Scene, adding: object, biome: object, view: View) -> None:
     """Water in the bed of a valley, which falls as the bed does."""
     from tetflora_addon.blender.compat import shader_tree
 
     along = np.linspace(-0.5 * _LAND, 0.5 * _LAND, 300)
     middle = adding.brook(along)
-    bed = adding.heights(along, middle, biome.ground) + deep
+    bed = adding.heights(along, middle, biome.ground) + view.water
     points = np.concatenate([np.stack([along, middle + side, bed], axis=1) for side in (-4.0, 4.0)])
     first = np.arange(len(along) - 1)
     faces = np.stack([first, first + 1, first + len(along) + 1, first + len(along)], axis=1)
@@ -213,32 +270,59 @@ def _brook(scene: bpy.types.Scene, adding: object, biome: object, deep: float) -
 
 
 def _mean(land: bpy.types.Object) -> list[float]:
-    """Mean color of a land's soil, linear RGB."""
-    image = land.data.materials[0].node_tree.nodes["Soil Map"].image
+    """Mean color of a land's soil with the green on it, linear RGB."""
+    nodes = land.data.materials[0].node_tree.nodes
+    image, tint = nodes["Soil Map"].image, np.array(nodes["Soil Green"].outputs[0].default_value[:3])
     pixels = np.zeros(4 * image.size[0] * image.size[1], np.float32)
     image.pixels.foreach_get(pixels)
-    shown = pixels.reshape(-1, 4)[:, :3].astype(np.float64)
-    return (np.where(shown <= 0.04045, shown / 12.92, ((shown + 0.055) / 1.055) ** 2.4)).mean(axis=0).tolist()
+    shown, green = np.split(pixels.reshape(-1, 4).astype(np.float64), [3], axis=1)
+    soil = np.where(shown <= 0.04045, shown / 12.92, ((shown + 0.055) / 1.055) ** 2.4)
+    return (soil + _GREEN * green * (tint - soil)).mean(axis=0).tolist()
 
 
-def _light(scene: bpy.types.Scene, view: View, around: bpy.types.Object) -> None:
+def dress(scene: bpy.types.Scene, view: View, camera: str, season: str) -> float:
+    """Look through a camera in a season, whose light it gets; the mean that the exposure aims at."""
     from .haze import add_haze
 
-    stage.sun(scene, view.sun[0], view.sun[1] - 180.0, 5.0 * view.light, view.tint, 0.8)
-    look: Look = replace(LOOKS["summer"], clouds=view.clouds, strength=LOOKS["summer"].strength * view.light)
-    scene.world = sky(look)
-    around.name = "Ground"
+    look, year, eye = LOOKS[season], scene.tetflora.year, camera == EYE
+    scene.camera = scene.objects[camera]
+    for old in [o for o in scene.objects if o.type == 'LIGHT' or o.name.startswith("Haze")]:
+        bpy.data.objects.remove(old)
+    year.enabled, year.day, year.snow = season != "summer", look.day, look.snow * view.snow
+    light, snowy = view.light if eye else 1.0, year.enabled and view.snow
+    high, tint = (min(view.sun[0], WINTER_SUN), look.tint) if snowy else (view.sun[0], view.tint)
+    stage.sun(scene, high, view.sun[1] - 180.0, 5.0 * light, tint, 0.8)
+    scene.world = sky(replace(look, clouds=view.clouds, strength=look.strength * light))
     add_haze(scene, *view.haze)
+    return look.gray if snowy else view.gray if eye else ABOVE_GRAY
 
 
 def render_biome(
     identifier: str, path: Path, size: tuple[int, int] = SIZE, samples: int = SAMPLES, view: View | None = None
 ) -> None:
-    """Render one biome, in an empty scene; as it is shown in menus, if no view is given."""
+    """Render one biome at eye height in summer, in an empty scene; as it is shown in menus, if no view is given."""
     session.clean_file()
     view = view or VIEWS.get(identifier, View())
     build(identifier, view)
-    render(path, size, samples, gray=view.gray, beyond=0.1)
+    render(path, size, samples, gray=dress(bpy.context.scene, view, EYE, "summer"), beyond=0.1)
+
+
+def render_views(identifier: str, folder: Path, size: tuple[int, int] = SIZE, samples: int = SAMPLES) -> list[Path]:
+    """Those of the pictures of one biome that a folder has not; at eye height and from above, in both seasons."""
+    cases = {(season, camera): _picture(folder, identifier, season, camera) for season in SHEETS for camera in CAMERAS}
+    missing = {case: path for case, path in cases.items() if not path.exists()}
+    if missing:
+        session.clean_file()
+        view = VIEWS.get(identifier, View())
+        build(identifier, view)
+        for (season, camera), path in missing.items():
+            gray = dress(bpy.context.scene, view, camera, season)
+            render(path, size, samples, gray=gray, beyond=0.1 if camera == EYE else 0.0)
+    return list(cases.values())
+
+
+def _picture(folder: Path, identifier: str, season: str, camera: str) -> Path:
+    return folder / f"{identifier}-{season}-{camera.lower().replace(' ', '-')}.png"
 
 
 def render_interior(path: Path) -> None:
@@ -257,15 +341,17 @@ def save_small(source: Path, identifier: str) -> Path:
     return target
 
 
-def render_sheet(path: Path, folder: Path) -> None:
-    """All biomes as one picture; those that the folder has not are rendered."""
-    cells = []
+def render_sheets(folder: Path, pictures: Path, size: tuple[int, int] = SIZE, samples: int = SAMPLES) -> None:
+    """All biomes in both seasons, a file each in a folder, from pictures; those that are missing are rendered."""
+    cells = {season: [] for season in SHEETS}
     for file in sorted(SHIPPED.glob("*.json")):
-        picture = folder / f"{file.stem}.png"
-        if not picture.exists():
-            render_biome(file.stem, picture)
-        cells.append((picture, json.loads(file.read_text(encoding="utf-8"))["name"]))
-    save_sheet(cells, COLUMNS, path)
+        render_views(file.stem, pictures, size, samples)
+        name = json.loads(file.read_text(encoding="utf-8"))["name"]
+        for season in SHEETS:
+            texts = zip(CAMERAS, (name, "from above"), strict=True)
+            cells[season] += [(_picture(pictures, file.stem, season, camera), text) for camera, text in texts]
+    for season, target in SHEETS.items():
+        save_sheet(cells[season], COLUMNS, folder / target, CELL)
 
 
 def main() -> int:
@@ -284,12 +370,13 @@ def main() -> int:
     size = arguments.width, round(arguments.width * SIZE[1] / SIZE[0])
     wanted = [file.stem for file in sorted(SHIPPED.glob("*.json"))] if arguments.all else arguments.biomes
     for identifier in wanted:
-        picture = arguments.out / f"{identifier}.png"
-        render_biome(identifier, picture, size, arguments.samples)
+        for old in arguments.out.glob(f"{identifier}-*.png"):
+            old.unlink()
+        picture, *_ = render_views(identifier, arguments.out, size, arguments.samples)
         if arguments.pictures:
             print(save_small(picture, identifier))
     if not arguments.no_sheet:
-        render_sheet(ROOT / "docs" / "images" / "biomes.jpg", arguments.out)
+        render_sheets(ROOT / "docs" / "images", arguments.out, size, arguments.samples)
     session.stop()
     return 0
 

@@ -107,9 +107,9 @@ def _interior(out: Path) -> None:
 
 
 def _biomes(out: Path) -> None:
-    from .biomes import render_sheet
+    from .biomes import render_sheets
 
-    render_sheet(IMAGES / "biomes.jpg", out)
+    render_sheets(IMAGES, out)
 
 
 def _assets(_out: Path) -> None:

@@ -124,8 +124,8 @@ _LEAF, _FIRST = 1 / 3, 4.0
 _RAMP, _NEAR = 1.5, 0.1
 #: What is left of twigs and boughs at death, and years until they have fallen: twigs, boughs, limbs.
 _LEFT, _FALLEN = (0.3, 0.6, 1.0), (4.0, 12.0, 45.0)
-_GRAY = (0.14, 0.122, 0.102)
-_GRAYING = 4.0
+#: Color of bare wood, years after death from which on all is gray, and bark that comes off in strips.
+_GRAY, _GRAYING, _STRIPS = (0.14, 0.122, 0.102), 4.0, "fibrous"
 
 
 def ages_of(species: Species) -> Ages:
@@ -268,8 +268,8 @@ class _Aged:
         if dead is not None:
             number, on_limbs = (self._dead_nodes(o)[0] for o in range(2))
             dead = replace(self._dead(), number=dead.number.scaled(number), on_limbs=dead.on_limbs.scaled(on_limbs))
-        bud = None if self.dead else one.bud
-        return replace(one, orders=orders, spur=spur, dead=dead, bud=bud)
+        bud, bark = (None if self.dead else one.bud), _STRIPS if self.dead > _GRAYING else one.bark
+        return replace(one, orders=orders, spur=spur, dead=dead, bud=bud, bark=bark)
 
     @property
     def height(self) -> float:

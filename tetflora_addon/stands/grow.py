@@ -522,6 +522,7 @@ class StandSettings:
         "Factor on the seeds that arrive from beyond the ground; at 0, only the stand itself bears seeds",
         **within(0.0, 10.0),
     )
+    disturbance: int = setting(0, "Disturbance", "Years before the end when all trees die; 0: never", min=0, max=2000)
     min_height: float = script_setting(1.0, min=0.0)  # meters; lower plants are not part of the result
     cell: float = script_setting(1.0, min=0.1)  # width, meters, of the columns in which light is computed
     #: Light comes in from all sides, as at the edge of a wood. Otherwise the stand goes on beyond the ground, and what
@@ -562,6 +563,7 @@ def _check(settings: StandSettings) -> None:
         ("Planted", settings.density, 0, 1e7),
         ("Seedlings", settings.recruits, 0, 1e6),
         ("Incoming Seeds", settings.outside, 0, 1e6),
+        ("Disturbance", settings.disturbance, 0, settings.years),
         ("Min Height", settings.min_height, 0, 200),
         ("Cell", settings.cell, 0.05, 50),
     ):
@@ -611,21 +613,19 @@ class GrowingStand:
         self._decay(year, record)
         crowns = plants.crowns(self.traits)
         strips = self.light.fill(crowns)
-        taken = np.zeros(len(plants))
+        taken, disturbed = np.zeros(len(plants)), year == self.settings.years - self.settings.disturbance
         for index, own in zip(strips, on_all_cores(self.light.taken, range(len(strips))), strict=True):
             taken[index] = own
 
         def changed(block: slice) -> tuple[Plants, Mask]:
             after = grown(plants, crowns, taken, self.light, self.traits, block)
-            return after, dying(after, self.traits, year)
+            return after, dying(after, self.traits, year) | disturbed
 
         parts = list(on_all_cores(changed, blocks(len(plants), _BLOCK)))
-        new = Plants.empty()
-        if self.settings.recruits > 0.0:
-            new = self.seeds.plants(plants, self.light, year, self.count, self.settings.seed)
+        sown = self.settings.recruits > 0.0
+        new = self.seeds.plants(plants, self.light, year, self.count, self.settings.seed) if sown else Plants.empty()
         if parts:
-            dead = np.concatenate([part[1] for part in parts])
-            self._die(plants.take(np.flatnonzero(dead)), year, record)
+            self._die(plants.take(np.flatnonzero(np.concatenate([part[1] for part in parts]))), year, record)
             plants = Plants.concatenate([part[0].take(~part[1]) for part in parts])
         self.plants = Plants.concatenate([plants, new])
         self.count += len(new)

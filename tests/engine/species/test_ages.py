@@ -123,6 +123,13 @@ def test_numbers_are_known_before_anything_is_compiled(name: str) -> None:
         assert expected_polygons(species) == pytest.approx(flora.polygons[row], rel=0.15)
 
 
+def test_bark_comes_off_dead_trees_once_their_wood_is_gray() -> None:
+    one = load_species("spruce")
+    fresh, old = (with_age(one, ages_of(one).lifespan + years) for years in (1.0, 6.0))
+    assert (fresh.bark, old.bark) == (one.bark, "fibrous") and one.bark != "fibrous"
+    assert old.orders[0].branch_color.mean != fresh.orders[0].branch_color.mean
+
+
 def test_dead_branches_spread_as_it_declines() -> None:
     ages = ages_of(load_species("oak"))
     numbers = []

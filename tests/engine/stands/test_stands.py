@@ -179,10 +179,26 @@ def test_dense_stands_thin_themselves() -> None:
     assert 4.5 < leaves < 8.0
 
 
+def test_a_disturbance_kills_all_and_others_follow_in_the_light() -> None:
+    """Before it the stand is as without; after it trees are dead, stand or lie, and what lives came from seed."""
+    short = replace(YEARS, years=46, interval=0)
+    undisturbed = run_to_end(grow(half_planted(), MIXED, replace(short, years=40)))
+    rows = run_to_end(grow(half_planted(), MIXED, replace(short, disturbance=6)))
+    killed = rows.dead == 6
+    assert set(rows.height[killed].tolist()) <= set(undisturbed.height[undisturbed.dead == 0].tolist())
+    assert 0 < rows.lying[killed].sum() < killed.sum()
+    alive = rows.take(np.flatnonzero(rows.dead == 0))
+    assert len(alive) and alive.height.max() < 0.5 * rows.height[killed].max()
+    lit = run_to_end(grow(half_planted(), MIXED, short))
+    young = lit.height[lit.dead == 0] < alive.height.max()
+    assert (alive.species == 1).sum() > (lit.species[lit.dead == 0][young] == 1).sum()
+
+
 @pytest.mark.parametrize(
     ("changes", "words"),
     [
         ({"years": 0}, "Years"),
+        ({"disturbance": 61}, "Disturbance"),
         ({"density": np.nan}, "Planted"),
         ({"cell": 0.0}, "Cell"),
         ({"density": 1e6}, "Planted"),
