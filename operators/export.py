@@ -66,4 +66,5 @@ class TETFLORA_OT_export_forest(FileJob, bpy.types.Operator, ExportHelper):
 
     def finish(self, context: bpy.types.Context, result: Exported) -> set[str]:
         made = f"{counted(result.plants, 'plant')} as {counted(result.variants, 'variant')}"
-        return self.done(f"{made} written to {result.path}, {result.megabytes:,.1f} MB")
+        told = [f"{made} written to {result.path}, {result.megabytes:,.1f} MB", *result.problems]
+        return self.done(". ".join(told), warns=result.problems)
