@@ -5,7 +5,7 @@
 Cycles bakes these on a square, in a scene of its own that is gone afterward.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -88,7 +88,7 @@ def with_surfaces(
     bake : bool
         Whether veins, bark and relief are baked; otherwise, textures have colors and outlines only.
     """
-    variants = list(_even(variants))
+    variants = list(_even(_on_trunks(scene, variants) if bake else variants))
     looks = _looks(variants)
     found: dict[tuple[str, str], BakedSurface] = {}
     for number, look in enumerate(looks):
@@ -129,6 +129,43 @@ def _even(variants: Sequence[Variant]) -> Iterator[Variant]:
         if variant.species not in sides:
             sides[variant.species] = sides_of(variant.levels)
         yield replace(variant, levels=opaque(variant.levels, sides[variant.species]))
+
+
+def _on_trunks(scene: bpy.types.Scene, variants: Sequence[Variant]) -> Iterator[Variant]:
+    """Variants whose trunks have the mean colors of their bark by height: textures have one mean for all wood."""
+    found: dict[str, Floats] = {}
+    for variant in variants:
+        girth = max((m.attributes["tf_girth"][1].max() for k, m in variant.levels[0].parts if k == "bark"), default=0.0)
+        material = materials_of(scene, species_for(scene, variant.species), "bark", 0)[0]
+        if variant.species not in found and girth and is_ours(material):
+            tone, ends = np.full(3, 0.2), (np.zeros(2), np.array([1.0, _ABOVE + 1.0]))
+            texels = baked(material, tone, 0.0, TEXELS, *ends, float(girth), {"color": PASSES["color"]})["color"]
+            found[variant.species] = texels.mean(axis=(1, 2), dtype=np.float64) / tone[0]
+        if variant.species in found:
+            rows, levels = found[variant.species], []
+            for level in variant.levels:
+                parts = ((k, _by_height(m, rows, girth) if k == "bark" else m) for k, m in level.parts)
+                levels.append(replace(level, parts=tuple(parts)))
+            variant = replace(variant, levels=tuple(levels))
+        yield variant
+
+
+def _by_height(bark: MeshBuffers, rows: Floats, girth: float) -> MeshBuffers:
+    """Bark with factors on the colors of its trunk: means over heights (t,), of which the last fifth goes on."""
+    top = len(rows) * 4 // 5
+    sums = np.concatenate([[0.0], np.cumsum(rows[:top]) / top * _ABOVE])
+    on = float(rows[top:].mean())
+    first, v = bark.face_offsets[:-1], bark.attributes["UVMap"][1][:, 1]
+    low, high = (each.reduceat(v, first).astype(np.float64) for each in (np.minimum, np.maximum))
+    below, whole = (
+        np.interp(end, np.linspace(0.0, _ABOVE, top + 1), sums)
+        + on * (np.maximum(end - _ABOVE, 0.0) + np.minimum(end, 0.0))
+        for end in (low, high)
+    )
+    factor = (whole - below) / np.maximum(high - low, 1e-9)
+    factor = np.where((bark.attributes["tf_girth"][1] > girth / 2.0) & (high > low), factor, 1.0)[:, None]
+    color = np.clip(bark.attributes["tf_color"][1] * factor, 0.0, 1.0).astype(np.float32)
+    return replace(bark, attributes={**bark.attributes, "tf_color": ("FACE", color)})
 
 
 def _looks(variants: Sequence[Variant]) -> list[_Look]:
@@ -228,11 +265,10 @@ class _Own:
 
 def _filled(images: dict[str, Floats32], own: _Own) -> dict[str, Floats32]:
     """The same without what is baked of transparent texels: black, and colors times the part that is not."""
-    cover, found = own.cover, {}
-    thin = (cover < _THIN)[..., None]
+    solid, found = own.cover >= 0.5, {}
     for name, texels in images.items():
-        texels = texels / np.maximum(cover, _THIN)[..., None] if PASSES[name][1] else texels
-        found[name] = np.where(thin, texels[cover >= 0.5].mean(axis=0), texels)
+        texels = texels / np.maximum(own.cover, 0.5)[..., None] if PASSES[name][1] else texels
+        found[name] = np.where(solid[..., None], texels, texels[solid].mean(axis=0))
     return found
 
 
@@ -279,7 +315,14 @@ _NAME = "TetFlora bake"
 
 
 def baked(
-    material: bpy.types.Material, color: Floats, through: float, size: int, low: Floats, extent: Floats, meters: float
+    material: bpy.types.Material,
+    color: Floats,
+    through: float,
+    size: int,
+    low: Floats,
+    extent: Floats,
+    meters: float,
+    passes: Mapping[str, tuple[str, bool]] = PASSES,
 ) -> dict[str, Floats32]:
     """Texels (size, size, 3) of a material by the names of `PASSES`, row 0 lowest.
 
@@ -300,7 +343,7 @@ def baked(
         node = copy.node_tree.nodes.active = copy.node_tree.nodes.new("ShaderNodeTexImage")
         with _square(copy, color, through, low, extent, meters) as (scene, obj):
             given = {"scene": scene, "view_layer": scene.view_layers[0], "active_object": obj, "object": obj}
-            for name, (kind, is_color) in PASSES.items():
+            for name, (kind, is_color) in passes.items():
                 node.image = bpy.data.images.new(_NAME, size, size, float_buffer=True, is_data=not is_color)
                 try:
                     with bpy.context.temp_override(**given, selected_objects=[obj], selected_editable_objects=[obj]):
