@@ -102,10 +102,12 @@ def pictures(points: NDArray, path: Path, engine: str = 'CYCLES', number: int = 
     # For each picture EEVEE would draw a large sky and empty half a gigabyte for shadows; a sample takes .3 s.
     scene.eevee.shadow_pool_size, samples = '16', _SAMPLES if engine == 'CYCLES' else EEVEE_SAMPLES
     camera = add_camera().data
-    camera.type, camera.clip_end = 'ORTHO', 1e5
+    camera.type = 'ORTHO'
     scene.render.resolution_x = scene.render.resolution_y = side
     scene.render.film_transparent, scene.view_settings.view_transform = True, 'Raw'
     middle, camera.ortho_scale = frame_of(points)
+    # EEVEE spreads the shadows of a sun over all of the camera's depth: too deep, and there are none.
+    camera.clip_start, camera.clip_end = (part * camera.ortho_scale for part in (1.0, 5.0))
     made = []
     for eye in eyes(number):
         scene.camera.location = middle + 3.0 * camera.ortho_scale * eye

@@ -63,7 +63,8 @@ class TETFLORA_OT_export_forest(FileJob, bpy.types.Operator, ExportHelper):
 
     def finish(self, context: bpy.types.Context, result: forest.Exported) -> set[str]:
         made = f"{counted(result.plants, 'plant')} as {counted(result.variants, 'variant')}"
-        return self.done(f"{made} written to {result.path}, {result.megabytes:,.1f} MB")
+        told = [f"{made} written to {result.path}, {result.megabytes:,.1f} MB", *result.problems]
+        return self.done(". ".join(told), warns=result.problems)
 
 
 class TETFLORA_OT_write_report(FileTool, bpy.types.Operator, ExportHelper):

@@ -111,8 +111,11 @@ def upward(points: Floats32) -> Floats32:
 
 
 def _add_material(document: _Document, folder: Path, surface: BakedSurface) -> int:
-    textures = {}
-    for name, file in surface.textures.items():
+    textures, files = {}, dict(surface.textures)
+    if surface.cut:
+        files["color"] = files.pop("card")
+        del files["opacity"]
+    for name, file in files.items():
         view = document.data((folder / file).read_bytes())
         image = document.add("images", {"bufferView": view, "mimeType": "image/png", "name": Path(file).stem})
         textures[name] = {"index": document.add("textures", {"source": image})}
@@ -127,6 +130,7 @@ def _add_material(document: _Document, folder: Path, surface: BakedSurface) -> i
         "extras": {"transmission": surface.transmission},
     }
     made |= {"normalTexture": textures["normal"]} if "normal" in textures else {}
+    made |= {"alphaMode": "MASK", "alphaCutoff": surface.cut} if surface.cut else {}
     return document.add("materials", made)
 
 

@@ -167,17 +167,19 @@ def _corrected(
 
 
 def _changed(parts: Parts, larger: float, tint: tuple[float, float, float] = _WHITE) -> Parts:
-    """Parts with leaves of so many times the area, each about its first vertex, and factors on all colors."""
+    """Parts with leaves of so many times the area, and factors on all colors."""
     made = []
     for kind, mesh in parts:
-        positions, color = mesh.positions, mesh.attributes["tf_color"][1]
-        if kind != "bark":
-            base = positions[connected(len(positions), *mesh.edge_verts.T)]
-            positions = base + np.float32(np.sqrt(larger)) * (positions - base)
-        color = np.clip(color * np.array(tint, np.float32), 0.0, 1.0)
-        attributes = {**mesh.attributes, "tf_color": ("FACE", color)}
-        made.append((kind, replace(mesh, positions=positions, attributes=attributes)))
+        color = np.clip(mesh.attributes["tf_color"][1] * np.array(tint, np.float32), 0.0, 1.0)
+        mesh = replace(mesh, attributes={**mesh.attributes, "tf_color": ("FACE", color)})
+        made.append((kind, mesh if kind == "bark" else with_area(mesh, larger)))
     return tuple(made)
+
+
+def with_area(mesh: MeshBuffers, larger: float) -> MeshBuffers:
+    """Leaves of so many times the area, each about its first vertex."""
+    base = mesh.positions[connected(len(mesh.positions), *mesh.edge_verts.T)]
+    return replace(mesh, positions=base + np.float32(np.sqrt(larger)) * (mesh.positions - base))
 
 
 def _views(grids: list[Grid], parts: Parts) -> list[PlantView]:

@@ -66,6 +66,6 @@ def _write_materials(path: Path, forest: Forest) -> None:
     for surface in forest.surfaces:
         color = " ".join(f"{x:.4f}" for x in surface.color)
         lines += [f"newmtl {surface.name}", f"Kd {color}", "Ks 0 0 0", f"Pr {surface.roughness:.3f}"]
-        named = (("map_Kd", "color"), ("norm", "normal"), ("map_Pr", "roughness"))
+        named = (("map_Kd", "color"), ("norm", "normal"), ("map_Pr", "roughness"), ("map_d", "card"))
         lines += [f"{key} {surface.textures[name]}" for key, name in named if name in surface.textures]
     path.write_text("\n".join(lines) + "\n", encoding="utf-8")

@@ -22,16 +22,17 @@ from .levels import Grid, PlantLevel
 #: Heights of light, each in how many directions; the irradiance of level ground from above or below, as much from the
 #: sun at 45 degrees as from the sky, and what the ground reflects, a fifth; and the part that shadows let through. Of
 #: the sky they let none through where paths are traced, all in EEVEE, where leaves are brighter for it: colors are in
-#: between.
+#: between, as far off in one as in the other.
+_PASSING = 0.375
 _LIGHT = (
     (np.full(8, np.sqrt(0.5)), 1.0, 0.0),
-    ((np.arange(12) + 0.5) / 12, 1.0, 1 / 3),
-    ((np.arange(6) + 0.5) / -6, 0.4, 1 / 3),
+    ((np.arange(12) + 0.5) / 12, 1.0, _PASSING),
+    ((np.arange(6) + 0.5) / -6, 0.4, _PASSING),
 )
 #: Directions to look from, all around: those of light turn by another angle, or they would lie along these.
 _VIEWS = spiral(np.full(4, 0.2), np.arange(4), np.pi / 2.0)
 #: Cells along a plant, and in how many of these its leaves do not shade themselves.
-_CELLS, _SLACK = 128, 1.5
+_CELLS, _SLACK = 384, 1.5
 #: Faces of the level that is looked at: it covers what the full plant does.
 _MOST = 40_000
 #: By the kind of parts (4,): how much is seen of light that falls on upper sides, and on undersides, together 1; beside

@@ -176,7 +176,7 @@ def test_a_plant_without_a_species_is_named(blender, tmp_path):
     assert list(tmp_path.iterdir()) == []
 
 
-@pytest.mark.parametrize("suffix", ["usdc", "usda"])
+@pytest.mark.parametrize("suffix", ["usdc", "usda", "glb", "obj"])
 def test_a_full_disk_leaves_no_half_file(blender, tmp_path, suffix, pxr):
     field()
     path = tmp_path / f"f.{suffix}"

@@ -250,6 +250,7 @@ class Exported:
     variants: int
     levels: tuple[dict, ...]  # figures of each level of each variant
     megabytes: float
+    problems: tuple[str, ...]  # what of the artist's materials is not as it was
 
 
 @job("Export Forest")
@@ -280,7 +281,8 @@ def export_steps(data: JobData, order: ExportOrder) -> Job[Exported]:
         steps = (Progress(0.8 + 0.2 * part, progress.message) for part in writer(folder / order.path.name, forest))
         yield from steps_in_thread(steps, progress)
         size = sum(file.stat().st_size for file in folder.rglob("*") if file.is_file())
-    return Exported(order.path, len(forest), len(forest.variants), _levels(forest), size / 1e6)
+    problems = tuple(dict.fromkeys(problem for surface in forest.surfaces for problem in surface.problems))
+    return Exported(order.path, len(forest), len(forest.variants), _levels(forest), size / 1e6, problems)
 
 
 def _levels(forest: Forest) -> tuple[dict, ...]:

@@ -227,6 +227,8 @@ def _write_surface(pxr: SimpleNamespace, stage: object, surface: BakedSurface) -
     shader.CreateInput("roughness", types.Float).Set(surface.roughness)
     shader.CreateInput("ior", types.Float).Set(surface.index)
     shader.CreateInput("diffuseColor", types.Color3f).Set(pxr.Gf.Vec3f(*surface.color))
+    if surface.cut:
+        shader.CreateInput("opacityThreshold", types.Float).Set(surface.cut)
     material.CreateSurfaceOutput().ConnectToSource(shader.ConnectableAPI(), "surface")
     if not surface.textures:
         return
@@ -234,7 +236,8 @@ def _write_surface(pxr: SimpleNamespace, stage: object, surface: BakedSurface) -
     place.CreateIdAttr("UsdPrimvarReader_float2")
     place.CreateInput("varname", types.String).Set("st")
     for name, file in surface.textures.items():
-        _write_texture(pxr, stage, f"{path}/{name}", name, file, (shader, place))
+        if name != "card":
+            _write_texture(pxr, stage, f"{path}/{name}", name, file, (shader, place))
 
 
 def _write_texture(
@@ -252,6 +255,7 @@ def _write_texture(
     key, output, of = {
         "color": ("diffuseColor", "rgb", types.Color3f),
         "roughness": ("roughness", "r", types.Float),
+        "opacity": ("opacity", "r", types.Float),
         "normal": ("normal", "rgb", types.Normal3f),
     }[name]
     if name == "normal":

@@ -457,7 +457,7 @@ class MeshLooks:
         types = {a.name: a.data_type for a in mesh.attributes if a.domain in _DOMAINS and a.data_type in _TYPES}
         self.materials = materials
         layers = MeshLayers(first, types)
-        self.plans = [_plan_of(material, layers, reader) for material in materials]  # one for each material
+        self.plans = [plan_of(material, layers, reader) for material in materials]  # one for each material
         self._values: dict[str, tuple[str, NDArray]] = {}
         for name in {name for plan in self.plans for name in plan.names}:
             attribute = mesh.attributes[name]
@@ -584,14 +584,14 @@ class Looks:
             return Look()
         types = {name: 'FLOAT2' if values.shape[1] == 2 else 'FLOAT_VECTOR' for name, values in attributes.items()}
         means = {name: values.mean(axis=0, dtype=np.float64) for name, values in attributes.items()}
-        plan = _plan_of(material, MeshLayers("", types, means), self._reader)
+        plan = plan_of(material, MeshLayers("", types, means), self._reader)
         cover, *color, through = plan.constant.astype(np.float64).tolist()
         color = np.clip(np.array(color) / max(cover, _LEAST), 0, 1)
         passed = np.clip(through / max(float(luminance(color * cover)), 1e-6), 0, 1)
         return Look(tuple(color.tolist()), float(passed) if plan.is_known else np.nan, cover)
 
 
-def _plan_of(material: bpy.types.Material | None, layers: MeshLayers, reader: FaceReader) -> Plan:
+def plan_of(material: bpy.types.Material | None, layers: MeshLayers, reader: FaceReader) -> Plan:
     """Evaluate a material once where everything has its mean, and note what that takes."""
     seen = np.array(GRAY if material is None else np.clip(material.diffuse_color[:3], 0, 1), np.float32)
     name = "" if material is None else material.name
