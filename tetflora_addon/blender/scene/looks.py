@@ -24,21 +24,10 @@ _OTHERS = ("color", "display_type", "show_bounds")
 
 
 class LayerLooks:
-    """LayerLooks of objects in a view layer, whose collections may say more than the objects."""
+    """Looks of objects in a view layer, whose collections may say more than the objects."""
 
-    def __init__(self, layer: bpy.types.ViewLayer) -> None:
-        self._layer = layer
-        self._shown: set[int] | None = None  # where collections are hidden in viewports, what others hold
-        waiting, shown, hidden = [layer.layer_collection], set(), False
-        while waiting:
-            one = waiting.pop()
-            if one.collection.hide_viewport:
-                hidden = True
-            else:
-                waiting += one.children
-                shown.update(obj.session_uid for obj in one.collection.objects)
-        if hidden:
-            self._shown = shown
+    def __init__(self, layer: bpy.types.ViewLayer, viewports: bool = True) -> None:
+        self._layer, self._viewports = layer, viewports  # whether these matter, where eyes may be closed as well
 
     def of(self, obj: bpy.types.Object, instancer: bpy.types.Object | None = None) -> str:
         """The look of an object, or of its instances that another shows, whose collections and holdout then count."""
@@ -56,7 +45,7 @@ class LayerLooks:
             found["off"] = sorted({*found.get("off", ()), "camera"})
         if obj.holdout_get(view_layer=self._layer):
             found["is_holdout"] = True
-        if self._shown is not None and obj.session_uid not in self._shown:
+        if self._viewports and not obj.visible_get(view_layer=self._layer):
             found["hide_viewport"] = True
         return found
 
@@ -83,9 +72,8 @@ def look_like(made: bpy.types.Object, like: bpy.types.Object | None, look: str |
     _copy(_OTHERS, like, made)
     own, others = getattr(made, "cycles", None), getattr(like, "cycles", None)
     if own is not None and others is not None:
-        _copy(
-            [p.identifier for p in own.bl_rna.properties if not p.is_readonly and p.identifier != "name"], others, own
-        )
+        names = [p.identifier for p in own.bl_rna.properties if not p.is_readonly and p.identifier != "name"]
+        _copy(names, others, own)
     said = json.loads(look or "{}")
     if look is None:
         said = _of_object(like)
