@@ -62,7 +62,7 @@ def test_what_is_not_described_follows_from_one_lifespan(name: str) -> None:
     longer = StandSpecies(replace(plain, ages=replace(ages, lifespan=20.0 * ages.lifespan))).needs
     for one, lifespan in ((needs, ages.lifespan), (longer, 20.0 * ages.lifespan)):
         years = one.diameter / one.diameter_increment
-        assert years == pytest.approx(0.35 * lifespan) or one.diameter_increment == 0.02 and years > 0.35 * lifespan
+        assert years == pytest.approx(0.35 * lifespan) or (one.diameter_increment == 0.02 and years > 0.35 * lifespan)
     assert longer.diameter_increment < 0.02
 
 

@@ -11,6 +11,9 @@ from collections.abc import Iterable
 from typing import Any
 
 import bpy
+from mathutils import Matrix
+
+from ..attributes import moves
 
 #: Custom property of result objects: their look.
 LIKE = "tetflora_like"
@@ -29,9 +32,14 @@ class LayerLooks:
     def __init__(self, layer: bpy.types.ViewLayer, viewports: bool = True) -> None:
         self._layer, self._viewports = layer, viewports  # whether these matter, where eyes may be closed as well
 
-    def of(self, obj: bpy.types.Object, instancer: bpy.types.Object | None = None) -> str:
+    def of(self, obj: bpy.types.Object, instancer: bpy.types.Object | None = None, model: bool = False) -> str:
         """The look of an object, or of its instances that another shows, whose collections and holdout then count."""
-        found = self._read(instancer or obj)
+        found = self._read(mover := instancer or obj)
+        if (
+            model and self._layer.id_data.render.use_motion_blur and moves(mover)
+        ):  # it carries results, which are blurred
+            here = mover.evaluated_get(self._layer.depsgraph).matrix_world
+            found["carried_by"] = mover.name_full, [list(row) for row in here]
         if instancer is not None:
             inner = _of_object(obj)
             off = {*found.get("off", ()), *inner.pop("off", ())}
@@ -64,7 +72,6 @@ def look_like(made: bpy.types.Object, like: bpy.types.Object | None, look: str |
     """Give a result the look, color and settings of Cycles of an object; nothing for None.
 
     Without a look it is what the object says itself, but for viewports: what is instanced may be hidden there.
-
     Output settings may hide it from more rays, but show it to none that the object is hidden from.
     """
     if like is None:
@@ -85,9 +92,8 @@ def look_like(made: bpy.types.Object, like: bpy.types.Object | None, look: str |
 def wear(made: bpy.types.Object) -> dict[str, Any]:
     """Give a result what its look says, but for what output settings have a say in; returns the look."""
     look = json.loads(made.get(LIKE) or "{}")
-    said = {f"visible_{ray}": False for ray in look.get("off", ())} | {
-        n: look[n] for n in (*_FLAGS, *_OWN) if n in look
-    }
+    said = {name: look[name] for name in (*_FLAGS, *_OWN) if name in look}
+    said |= {f"visible_{ray}": False for ray in look.get("off", ())}
     for name, value in said.items():
         if getattr(made, name) != value:  # each change makes Blender list all objects anew
             setattr(made, name, value)
@@ -95,6 +101,11 @@ def wear(made: bpy.types.Object) -> dict[str, Any]:
         if name in look and getattr(made.light_linking, name) is None:
             found = next((c for c in bpy.data.collections if c.name_full == look[name]), None)
             setattr(made.light_linking, name, found)
+    if "carried_by" in look and not made.constraints:
+        name, here = look["carried_by"]
+        carried = made.constraints.new('CHILD_OF')
+        carried.target = next((o for o in bpy.data.objects if o.name_full == name), None)
+        carried.inverse_matrix = Matrix(here).inverted_safe()
     return look
 
 
