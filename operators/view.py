@@ -254,6 +254,4 @@ class TETFLORA_OT_mend(Reporting, bpy.types.Operator):
             return bpy.ops.tetflora.daylight()
         if self.what == "camera":
             return bpy.ops.tetflora.look(where='EYE')
-        if not mend(context.scene, self.what):
-            return self.refused("It is no longer there")
-        return {'FINISHED'}
+        return {'FINISHED'} if mend(context.scene, self.what) else self.refused("It is no longer there")

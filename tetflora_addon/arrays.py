@@ -116,9 +116,9 @@ class Arrays:
             if index.all():
                 return self
             index = np.flatnonzero(index)  # once, not for each column
-        columns = (getattr(self, name) for name in _names(type(self)))
-        columns = (c.take(index) if isinstance(c, Arrays) else c for c in columns)
-        return type(self)(*(gathered(c, index) if isinstance(c, np.ndarray) else c for c in columns))
+        columns = [getattr(self, name) for name in _names(type(self))]
+        columns = (gathered(c, index) if isinstance(c, np.ndarray) else c for c in columns)
+        return type(self)(*(c.take(index) if isinstance(c, Arrays) else c for c in columns))
 
     @classmethod
     def concatenate(cls, parts: Sequence[Self]) -> Self:
@@ -161,14 +161,13 @@ def gathered(array: NDArray, index: NDArray | slice) -> NDArray:
     """``array[index]`` of an array (n, ...), by component; ``index`` is integers (k,), a mask (n,) or a slice."""
     if isinstance(index, slice):
         return array[index]
-    if index.dtype == bool:
-        index = np.flatnonzero(index)
-    if array.ndim == 1:
-        return np.take(array, index)
-    # As it lies in memory: numpy would copy all of it first. Not np.moveaxis, which takes as long as arithmetic on a
-    # thousand numbers.
+    index = np.flatnonzero(index) if index.dtype == bool else index
+    if array.ndim <= 2:  # most are, and the order of a matrix's axes takes as long as its numbers
+        return array.T.take(index, axis=-1).T
+    # As it lies in memory: numpy would copy all of it first. Neither here nor below np.moveaxis or np.stack, which take
+    # as long as arithmetic on a thousand numbers.
     order = sorted(range(1, array.ndim), key=array.strides.__getitem__, reverse=True)
-    picked = np.take(array.transpose(*order, 0), index, axis=-1)
+    picked = array.transpose(*order, 0).take(index, axis=-1)
     return picked.transpose(-1, *(order.index(axis) for axis in range(1, array.ndim)))
 
 
@@ -256,7 +255,7 @@ def dot(a: NDArray, b: NDArray) -> NDArray:
 
 def cross(a: NDArray, b: NDArray) -> NDArray:
     """Vector products (n, 3); numpy's own shuffles axes."""
-    return np.stack(
+    return np.array(
         [
             a[:, 1] * b[:, 2] - a[:, 2] * b[:, 1],
             a[:, 2] * b[:, 0] - a[:, 0] * b[:, 2],
@@ -267,11 +266,11 @@ def cross(a: NDArray, b: NDArray) -> NDArray:
 
 def products(a: NDArray, b: NDArray) -> NDArray:
     """Matrix products (n, 3, 3) of matrices (n, 3, 3), by component: numpy multiplies small ones one by one."""
-    a, b = np.moveaxis(a, 0, -1), np.moveaxis(b, 0, -1)
+    a, b = a.transpose(1, 2, 0), b.transpose(1, 2, 0)
     out = a[:, 0, None] * b[None, 0]
     out += a[:, 1, None] * b[None, 1]
     out += a[:, 2, None] * b[None, 2]
-    return np.moveaxis(out, -1, 0)
+    return out.transpose(2, 0, 1)
 
 
 def in_axes(points: NDArray, frame: NDArray, origin: NDArray | tuple[float, ...] = (0.0, 0.0, 0.0)) -> NDArray:
@@ -281,7 +280,8 @@ def in_axes(points: NDArray, frame: NDArray, origin: NDArray | tuple[float, ...]
     """
     x, y, z = (points[..., i] - points.dtype.type(origin[i]) for i in range(3))
     frame = frame.astype(points.dtype)
-    return np.moveaxis(np.stack([x * frame[0, k] + y * frame[1, k] + z * frame[2, k] for k in range(3)]), 0, -1)
+    out = np.array([x * frame[0, k] + y * frame[1, k] + z * frame[2, k] for k in range(3)])
+    return out.transpose(*range(1, out.ndim), 0)
 
 
 def length(a: NDArray) -> NDArray:

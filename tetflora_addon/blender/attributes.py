@@ -139,9 +139,20 @@ def matrix_now(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Floats:
     if evaluated.is_evaluated:
         return np.array(evaluated.matrix_world)
     own = np.array(obj.matrix_basis)
-    if obj.parent is None:
-        return own
-    return matrix_now(obj.parent, depsgraph) @ np.array(obj.matrix_parent_inverse) @ own
+    parent = obj.parent
+    return own if parent is None else matrix_now(parent, depsgraph) @ np.array(obj.matrix_parent_inverse) @ own
+
+
+def moves(obj: bpy.types.Object | None) -> bool:
+    """Whether an action moves an object or one of its parents, and motion blur is on for it."""
+    if obj is not None and not getattr(getattr(obj, "cycles", None), "use_motion_blur", True):
+        return False
+    while obj is not None:
+        animation = obj.animation_data
+        if animation is not None and animation.action is not None and animation.action_slot is not None:
+            return True
+        obj = obj.parent
+    return False
 
 
 def frames_of(linear: Floats) -> tuple[Floats, Floats, Mask]:

@@ -78,9 +78,7 @@ def in_main_thread(function: Callable[[], _Result] = sync_view_layers) -> _Resul
     function : callable
         By default `sync_view_layers`: what the main thread was doing is done then.
     """
-    if bpy.app.background or on_main_thread():
-        return function()
-    return _handed_over(function)
+    return function() if bpy.app.background or on_main_thread() else _handed_over(function)
 
 
 def window_draws() -> bool:

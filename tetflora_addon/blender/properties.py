@@ -275,10 +275,12 @@ def register() -> None:
     _register()
     bpy.types.Object.tetflora = pointer_to(TetFloraObject, override=_OVERRIDES)
     bpy.types.Scene.tetflora = pointer_to(TetFloraScene)
+    bpy.types.Collection.tetflora_assets = list_of(asset_species.TetFloraAssetSpecies, "Asset Species", **HIDDEN)
 
 
 def unregister() -> None:
     """Remove them; what is stored in the file stays there."""
+    del bpy.types.Collection.tetflora_assets
     del bpy.types.Scene.tetflora
     del bpy.types.Object.tetflora
     _unregister()

@@ -363,9 +363,7 @@ class TetFloraYear(bpy.types.PropertyGroup):
 def season_of(scene: bpy.types.Scene) -> Season | None:
     """The season at the scene's frame, its day within one year; None without seasons."""
     group = scene.tetflora.year
-    if not group.enabled:
-        return None
-    return Season(group.day % DAYS, group.latitude, group.spread, group.snow)
+    return Season(group.day % DAYS, group.latitude, group.spread, group.snow) if group.enabled else None
 
 
 def years_of(scene: bpy.types.Scene) -> float:

@@ -264,18 +264,18 @@ class Frontier:
             prints = kind.prints(self.coverage, slab)
             outside = self.coverage.outside(prints)
             hidden = ~outside & self.coverage.hidden(prints)
-            self.outside[number].append(slab.take(np.flatnonzero(outside)))
-            self.hidden[number].append(slab.take(np.flatnonzero(hidden)))
-            seen = np.flatnonzero(~outside & ~hidden)
+            self.outside[number].append(slab.take(outside))
+            self.hidden[number].append(slab.take(hidden))
+            seen = ~outside & ~hidden
             slab, depth = slab.take(seen), depth[seen]
             slab = replace(slab, parts=kind.met(slab.parts, self.shown))
             large = self.large(kind, slab)
-            ready.append(slab.take(np.flatnonzero(~large)))
+            ready.append(slab.take(~large))
             some = np.flatnonzero(large)
             parts, owner = kind.opened(slab.parts.take(some))
             new, depth = self.pool(kind, parts), depth[some][owner]
-            later.append(new.take(np.flatnonzero(new.near > depth)))
-            soon = np.flatnonzero(new.near <= depth)
+            soon = new.near <= depth
+            later.append(new.take(new.near > depth))
             slab, depth = new.take(soon), depth[soon]
         return Waiting.concatenate(ready), later
 

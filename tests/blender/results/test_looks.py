@@ -12,6 +12,7 @@ from tests.blender.scenes import add_camera, add_mesh, add_plant, depsgraph, tin
 from tetflora_addon.blender.attributes import read
 from tetflora_addon.blender.job import refine
 from tetflora_addon.blender.scene.fields import write_field
+from tetflora_addon.blender.scene.objects import view_layer_groups
 
 LEFT, RIGHT = (-3.0, 0.0, 0.0), (3.0, 0.0, 0.0)
 
@@ -152,6 +153,38 @@ def test_collections_hidden_in_viewports_hide_their_results_there(scene):
     layer.collection.hide_viewport = True
     own, others = results(scene)
     assert all(o.hide_viewport and not o.hide_render for o in own) and not any(o.hide_viewport for o in others)
+
+
+@pytest.mark.parametrize("make", MADE)
+@pytest.mark.parametrize("closed", ["object", "collection"])
+def test_what_has_its_eye_closed_has_results_that_viewports_hide_and_renders_show(scene, tmp_path, make, closed):
+    special = make(scene)
+    layer = in_collection(scene, special)
+    if special.type == 'MESH':
+        special.modifiers.new("two", 'ARRAY')
+    before = alpha(scene, tmp_path)
+    for _ in range(2):  # that originals are hidden for results says nothing
+        refine.refine(scene, depsgraph())
+        assert not any(o.hide_viewport for o in scene.objects if o.get("tetflora_kind"))
+    if closed == "object":
+        refine.clear(scene)
+        special.hide_set(True)
+    else:
+        layer.hide_viewport = True
+    own, others = results(scene)
+    assert all(o.hide_viewport and not o.hide_render for o in own) and not any(o.hide_viewport for o in others)
+    refine.clear(scene)
+    assert alpha(scene, tmp_path) == pytest.approx(before)
+
+
+def test_eyes_of_view_layers_divide_no_render(scene):
+    special = as_plant(scene)
+    in_collection(scene, special)
+    second = scene.view_layers.new("second")
+    second.layer_collection.children["special"].hide_viewport = True
+    assert len(view_layer_groups(scene)) == 1
+    second.layer_collection.children["special"].holdout = True
+    assert len(view_layer_groups(scene)) == 2
 
 
 def test_view_layers_with_other_holdouts_have_results_of_their_own(scene, tmp_path):

@@ -8,7 +8,8 @@ import bpy
 import numpy as np
 import pytest
 
-from tests.blender.scenes import add_camera, add_plant, depsgraph, tiny_render
+from tests.blender.scenes import add_camera, add_mesh, add_plant, depsgraph, tiny_render
+from tetflora_addon.blender.assets.marks import use_as_species
 from tetflora_addon.blender.attributes import read
 from tetflora_addon.blender.job import refine
 from tetflora_addon.blender.scene.camera import read_camera
@@ -168,3 +169,23 @@ def test_a_camera_moved_by_its_parent_is_read_while_its_shutter_is_open(scene):
     animated(parent)
     camera = read_camera(scene, depsgraph())
     assert [round(float(other.position[0]), 4) for other in camera.shutter] == [-PACE / 2, PACE / 2]
+
+
+@pytest.mark.parametrize("detail", ['AUTO', 'REFINE'])
+def test_models_are_carried_by_what_moves_them(scene, detail):
+    """Meshes that are refined, and plants whose species is a model; others stay."""
+    rock, model = add_mesh("rock", size=0.5), add_mesh("model", size=0.5)
+    rock.tetflora.is_explicit = True
+    species = use_as_species(scene, depsgraph(), model).identifier
+    for obj in (rock, add_plant("moving", species)):
+        animated(obj)
+    add_plant("still", species, location=(0.0, 3.0, 0.0))
+    scene.tetflora.asset_detail = detail
+    for blurred in (True, False):
+        scene.render.use_motion_blur = blurred
+        scene.frame_set(2)
+        refine.refine(scene, depsgraph())
+        scene.frame_set(3)
+        made = [o for o in scene.objects if o.get("tetflora_kind", "species") != "species"]
+        moved = [round(o.evaluated_get(depsgraph()).matrix_world.translation.x, 3) for o in made]
+        assert moved.count(PACE) == 2 * blurred and moved.count(0.0) == len(moved) - 2 * blurred > 0

@@ -10,14 +10,18 @@ import bpy
 import numpy as np
 import pytest
 
-from tests.blender.scenes import add_camera, add_plant, depsgraph
+from tests.blender.scenes import add_camera, add_mesh, add_plant, depsgraph
+from tetflora_addon.blender.assets.marks import stop_using, use_as_species
+from tetflora_addon.blender.assets.places import plant_places
 from tetflora_addon.blender.job import refine
 from tetflora_addon.blender.placing.plant_objects import link_field
 from tetflora_addon.blender.scene.fields import write_field
 from tetflora_addon.blender.scene.plants import read_plants
+from tetflora_addon.blender.species.asset_species import asset_species
 from tetflora_addon.blender.species.edits import (
     catalog,
     change_species,
+    pack,
     revert_species,
     species_data,
     species_for,
@@ -104,6 +108,53 @@ def test_appended_plants_bring_their_species_and_hand_them_on(library, tmp_path)
     bpy.ops.wm.read_homefile(use_empty=True)
     bring(path, link=True)
     check()
+
+
+@pytest.fixture
+def models(tmp_path):
+    """A file with plants that are models: an object, and a collection of variants."""
+    scene, outer = bpy.context.scene, bpy.data.collections.new(PLANTS)
+    scene.collection.children.link(outer)
+    variants = bpy.data.collections.new("variants")
+    variants.objects.link(add_mesh("one", size=0.4))
+    for n, model in enumerate((add_mesh("model", size=0.3), variants)):
+        species = use_as_species(scene, depsgraph(), model, variants=True).identifier
+        plant = add_plant(f"plant {n}", species, n, (2.0 * n, 0.0, 0.0))
+        scene.collection.objects.unlink(plant)
+        outer.objects.link(plant)
+    path = str(tmp_path / "models.blend")
+    bpy.ops.wm.save_as_mainfile(filepath=path)
+    bpy.ops.wm.read_homefile(use_empty=True)
+    return path
+
+
+def models_seen():
+    """Names of what plants look like, after they are refined as well."""
+    found = [(p.target.shown.name, len(p)) for p in plant_places(bpy.context.scene, depsgraph())]
+    small_picture()
+    bpy.context.scene.tetflora.asset_detail = 'REFINE'
+    assert refine.refine(bpy.context.scene, depsgraph()).instances == 2
+    return sorted(found)
+
+
+@pytest.mark.parametrize("link", [True, False])
+def test_plants_that_are_models_have_them(models, link, tmp_path):
+    bring(models, link)
+    assert models_seen() == [("model", 1), ("one", 1)]
+    path = str(tmp_path / "second.blend")
+    bpy.ops.wm.save_as_mainfile(filepath=path)
+    bpy.ops.wm.open_mainfile(filepath=path)
+    assert len(plant_places(bpy.context.scene, depsgraph())) == 2
+
+
+def test_a_model_that_is_used_no_more_does_not_come_back(models):
+    collection = bring(models, link=False)
+    stop_using(bpy.data.objects["model"])
+    assert len(collection.tetflora_assets) == len(asset_species()) == 1
+    for plant in list(collection.objects):
+        bpy.data.objects.remove(plant)
+    pack()
+    assert not len(collection.tetflora_assets)
 
 
 def test_what_is_reverted_does_not_come_back(library):

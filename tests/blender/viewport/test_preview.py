@@ -333,6 +333,35 @@ def test_simple_shapes_make_way_for_refined_plants_where_these_are_seen(monkeypa
     assert is_drawn()
 
 
+@pytest.mark.parametrize("how", ["eye", "collection's eye", "monitor"])
+def test_what_is_hidden_in_viewports_has_no_shape_there(monkeypatch, how):
+    scene, _, plants = scene_of_plants(3)
+    scene.tetflora.preview.plants = 'LIGHT'
+    apart = bpy.data.collections.new("apart")
+    scene.collection.children.link(apart)
+    scene.collection.objects.unlink(plants[0])
+    apart.objects.link(plants[0])
+    assert read_shapes(scene, depsgraph()).of == 3
+    monkeypatch.setattr(levels, "schedule", lambda: asked.append(True))
+    asked, update = [], SimpleNamespace(id=scene)
+    told = SimpleNamespace(updates=[update], view_layer=bpy.context.view_layer)
+    _on_update(scene, told)
+    assert not asked
+    if how == "eye":
+        plants[0].hide_set(True)
+    elif how == "monitor":
+        plants[0].hide_viewport = True
+    else:
+        bpy.context.view_layer.layer_collection.children["apart"].hide_viewport = True
+    _on_update(scene, told)
+    assert asked
+    assert read_shapes(scene, depsgraph()).of == 2
+    for plant in plants[1:]:
+        plant.hide_set(True)
+    read_shapes(scene, depsgraph())
+    assert state.find(scene).shapes is None and "hidden in viewports" in state.find(scene).message
+
+
 def test_results_say_what_has_changed_since_they_were_made():
     scene, camera, _ = scene_of_plants(1)
     assert auto.changed_since(scene) == []

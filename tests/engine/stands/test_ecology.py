@@ -57,7 +57,13 @@ def test_every_species_can_grow_in_a_stand(name: str) -> None:
 def test_what_is_not_described_follows_from_one_lifespan(name: str) -> None:
     """A trunk thickens in a stand within the years after which the same plant, as it grows by its age, dies."""
     plain = replace(load_species(name), ages=None, ecology=None)
-    assert StandSpecies(replace(plain, ages=ages_of(plain))).needs == StandSpecies(plain).needs
+    ages, needs = ages_of(plain), StandSpecies(plain).needs
+    assert StandSpecies(replace(plain, ages=ages)).needs == needs
+    longer = StandSpecies(replace(plain, ages=replace(ages, lifespan=20.0 * ages.lifespan))).needs
+    for one, lifespan in ((needs, ages.lifespan), (longer, 20.0 * ages.lifespan)):
+        years = one.diameter / one.diameter_increment
+        assert years == pytest.approx(0.35 * lifespan) or (one.diameter_increment == 0.02 and years > 0.35 * lifespan)
+    assert longer.diameter_increment < 0.02
 
 
 def test_it_changes_no_plant() -> None:

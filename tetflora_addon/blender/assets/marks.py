@@ -13,6 +13,7 @@ is compiled and no renderer is asked. Materials count by their mean color.
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from hashlib import blake2b
+from itertools import count
 from typing import Any
 
 import bpy
@@ -281,7 +282,7 @@ def use_as_species(
     if not can_be_species(datablock):
         raise SceneError(f'"{datablock.name}" cannot be used as a species: {_NO_FACES}')
     entry = asset_of(datablock, scene)
-    new = entry is None
+    new = entry is None or entry.id_data.library is not None
     if new:
         entry = scene.tetflora.asset_species.add()
         entry.identifier = _identifier(datablock)
@@ -305,13 +306,9 @@ def use_as_species(
 def _identifier(datablock: Datablock) -> str:
     taken = {entry.identifier for entry in entries_of()}
     kind = "collection" if isinstance(datablock, bpy.types.Collection) else "object"
-    number = 0
-    while True:
-        text = f"{kind}:{datablock.name_full}:{number}"
-        identifier = PREFIX + blake2b(text.encode(errors="backslashreplace"), digest_size=6).hexdigest()
-        if identifier not in taken:
-            return identifier
-        number += 1
+    texts = (f"{kind}:{datablock.name_full}:{number}".encode(errors="backslashreplace") for number in count())
+    made = (PREFIX + blake2b(text, digest_size=6).hexdigest() for text in texts)
+    return next(identifier for identifier in made if identifier not in taken)
 
 
 def measure_again(depsgraph: bpy.types.Depsgraph, entry: TetFloraAssetSpecies) -> bool:
@@ -350,7 +347,8 @@ def stop_using(datablock: Datablock) -> int:
 
 
 def _remove(entry: TetFloraAssetSpecies) -> None:
-    entries = entry.id_data.tetflora.asset_species
+    home = entry.id_data
+    entries = home.tetflora.asset_species if isinstance(home, bpy.types.Scene) else home.tetflora_assets
     entries.remove(next(i for i, other in enumerate(entries) if other.identifier == entry.identifier))
 
 

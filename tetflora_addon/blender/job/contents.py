@@ -148,7 +148,7 @@ def read_scene(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> SceneC
         baked = scene.tetflora.baked_light != 'OFF' and not scene.tetflora.expand_everything
         sources = read_sources(scene, depsgraph) if baked else None
         looks = LayerLooks(depsgraph.view_layer)
-        worn = {owner: looks.of(owner) for owner in dict.fromkeys(one.owner for one in places)}
+        worn = {owner: looks.of(owner, model=True) for owner in dict.fromkeys(one.owner for one in places)}
         occluders = read_occluders(depsgraph)
         return SceneContents(seeds, explicit, occluders, lights, sources, owners, places, worn, unknown)
 

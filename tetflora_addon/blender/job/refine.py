@@ -103,15 +103,15 @@ def _scatters(owner: bpy.types.Object | None) -> bool:
 
 def _write_plain(run: _Run) -> None:
     """Write instances of plants as originals; objects that scatter go on showing theirs themselves."""
-    shown: dict[Target, list[Places]] = {}
+    shown: dict[tuple[Target, bpy.types.Object | None], list[Places]] = {}
     for one in run.given.places:
         run.statistics.instances_whole += len(one)
         if not _scatters(one.owner):
-            shown.setdefault(one.target, []).append(one)
-    for number, (target, every) in enumerate(shown.items()):
+            shown.setdefault((one.target, one.owner if run.given.looks[one.owner] else None), []).append(one)
+    for number, ((target, like), every) in enumerate(shown.items()):
         matrices, keys = (np.concatenate([getattr(one, name) for one in every]) for name in ("matrices", "keys"))
         source = target.datablock or carrier_of(run.results, target)
-        add_instances(run.results, f"{target.name} {number:03d}", source, matrices, _ids(keys))
+        add_instances(run.results, f"{target.name} {number:03d}", source, matrices, _ids(keys), like)
 
 
 def _ids(keys: Keys) -> Integers32:

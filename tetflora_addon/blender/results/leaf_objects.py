@@ -226,9 +226,7 @@ def materials_of(scene: bpy.types.Scene, species: Species, kind: str, form: int)
     if kind == "bark":
         return [_in_viewports(bark_material(species.name, species.bark), species, kind)]
     own = _brought(scene, species.identifier, kind, form)
-    if any(own):
-        return own
-    return [_in_viewports(species_leaf_material(species, kind), species, kind)]
+    return own if any(own) else [_in_viewports(species_leaf_material(species, kind), species, kind)]
 
 
 def brought_materials(scene: bpy.types.Scene, kind_of_plant: str) -> list[list[str]]:

@@ -11,8 +11,8 @@ import numpy as np
 from ...arrays import Floats
 from ...camera.camera import Camera
 from ...errors import SceneError
-from ..attributes import frames_of, world_matrix
-from .motion import exposure, moment, moves
+from ..attributes import frames_of, moves, world_matrix
+from .motion import exposure, moment
 
 _NARROW = 1e-9  # of windows that single precision turns into nothing
 #: Half of the angle of view below which a fisheye is no whole sphere, radians.

@@ -61,13 +61,13 @@ def read_explicit(depsgraph: bpy.types.Depsgraph) -> Explicit | None:
             continue
         if instance.is_instance and (_unseen(instance) or scatters(owner)):
             continue
-        look = looks.of(instance.object.original, owner) if instance.is_instance else looks.of(owner)
+        look = looks.of(instance.object.original, owner if instance.is_instance else None, model=True)
         if reader.add(instance.object, np.array(instance.matrix_world, dtype=np.float64), look):
             found.add(owner)
-    # Objects that are switched off in viewports but render are not evaluated: they come without modifiers.
+    # Objects whose eye is closed are listed nowhere; those that are disabled in viewports come without modifiers.
     for obj in sorted(marked - found, key=lambda o: o.name_full):
-        unseen = obj.type in SURFACE_TYPES and not obj.evaluated_get(depsgraph).is_evaluated
-        if unseen and reader.add(obj, world_matrix(obj, depsgraph), looks.of(obj)):
+        unseen = obj.type in SURFACE_TYPES and not obj.visible_get(view_layer=depsgraph.view_layer)
+        if unseen and reader.add(obj.evaluated_get(depsgraph), world_matrix(obj, depsgraph), looks.of(obj, model=True)):
             found.add(obj)
         else:
             raise SceneError(
@@ -156,25 +156,13 @@ def _surface(name: str, mesh: bpy.types.Mesh, materials: list[bpy.types.Material
     # Unknown transmission: light goes through a material whose faces are mostly sheets.
     sheets = np.bincount(slot, ~solid, len(seen)) * 2 > np.bincount(slot, minlength=len(seen))
     transmission = np.where(np.isnan(transmission), np.where(sheets, _SHEET_TRANSMISSION, 0.0), transmission)
-    normals = None
     sharp = mesh.attributes.get("sharp_face")
-    if sharp is None or not values_of(sharp).all():
-        normals = members(mesh.corner_normals, "vector", 3)
+    smooth = sharp is None or not values_of(sharp).all()
+    normals = members(mesh.corner_normals, "vector", 3) if smooth else None
+    colors, coverage = (np.array([getattr(look, of) for look in seen], np.float64) for of in ("color", "coverage"))
+    of_slots = slot, colors, transmission, coverage
     return Surface(
-        name=name,
-        positions=positions,
-        corner_verts=corner_verts,
-        face_offsets=offsets,
-        triangles=triangles,
-        material=slot,
-        colors=np.array([look.color for look in seen], np.float64),
-        transmission=transmission,
-        coverage=np.array([look.coverage for look in seen], np.float64),
-        solid=solid,
-        leaf=leaf,
-        width=width,
-        attributes=attributes,
-        normals=normals,
+        name, positions, corner_verts, offsets, triangles, *of_slots, solid, leaf, width, attributes, normals
     )
 
 

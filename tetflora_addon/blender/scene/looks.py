@@ -11,6 +11,9 @@ from collections.abc import Iterable
 from typing import Any
 
 import bpy
+from mathutils import Matrix
+
+from ..attributes import moves
 
 #: Custom property of result objects: their look.
 LIKE = "tetflora_like"
@@ -24,25 +27,19 @@ _OTHERS = ("color", "display_type", "show_bounds")
 
 
 class LayerLooks:
-    """LayerLooks of objects in a view layer, whose collections may say more than the objects."""
+    """Looks of objects in a view layer, whose collections may say more than the objects."""
 
-    def __init__(self, layer: bpy.types.ViewLayer) -> None:
-        self._layer = layer
-        self._shown: set[int] | None = None  # where collections are hidden in viewports, what others hold
-        waiting, shown, hidden = [layer.layer_collection], set(), False
-        while waiting:
-            one = waiting.pop()
-            if one.collection.hide_viewport:
-                hidden = True
-            else:
-                waiting += one.children
-                shown.update(obj.session_uid for obj in one.collection.objects)
-        if hidden:
-            self._shown = shown
+    def __init__(self, layer: bpy.types.ViewLayer, viewports: bool = True) -> None:
+        self._layer, self._viewports = layer, viewports  # whether these matter, where eyes may be closed as well
 
-    def of(self, obj: bpy.types.Object, instancer: bpy.types.Object | None = None) -> str:
+    def of(self, obj: bpy.types.Object, instancer: bpy.types.Object | None = None, model: bool = False) -> str:
         """The look of an object, or of its instances that another shows, whose collections and holdout then count."""
-        found = self._read(instancer or obj)
+        found = self._read(mover := instancer or obj)
+        if (
+            model and self._layer.id_data.render.use_motion_blur and moves(mover)
+        ):  # it carries results, which are blurred
+            here = mover.evaluated_get(self._layer.depsgraph).matrix_world
+            found["carried_by"] = mover.name_full, [list(row) for row in here]
         if instancer is not None:
             inner = _of_object(obj)
             off = {*found.get("off", ()), *inner.pop("off", ())}
@@ -56,7 +53,7 @@ class LayerLooks:
             found["off"] = sorted({*found.get("off", ()), "camera"})
         if obj.holdout_get(view_layer=self._layer):
             found["is_holdout"] = True
-        if self._shown is not None and obj.session_uid not in self._shown:
+        if self._viewports and not obj.visible_get(view_layer=self._layer):
             found["hide_viewport"] = True
         return found
 
@@ -75,7 +72,6 @@ def look_like(made: bpy.types.Object, like: bpy.types.Object | None, look: str |
     """Give a result the look, color and settings of Cycles of an object; nothing for None.
 
     Without a look it is what the object says itself, but for viewports: what is instanced may be hidden there.
-
     Output settings may hide it from more rays, but show it to none that the object is hidden from.
     """
     if like is None:
@@ -83,9 +79,8 @@ def look_like(made: bpy.types.Object, like: bpy.types.Object | None, look: str |
     _copy(_OTHERS, like, made)
     own, others = getattr(made, "cycles", None), getattr(like, "cycles", None)
     if own is not None and others is not None:
-        _copy(
-            [p.identifier for p in own.bl_rna.properties if not p.is_readonly and p.identifier != "name"], others, own
-        )
+        names = [p.identifier for p in own.bl_rna.properties if not p.is_readonly and p.identifier != "name"]
+        _copy(names, others, own)
     said = json.loads(look or "{}")
     if look is None:
         said = _of_object(like)
@@ -97,9 +92,8 @@ def look_like(made: bpy.types.Object, like: bpy.types.Object | None, look: str |
 def wear(made: bpy.types.Object) -> dict[str, Any]:
     """Give a result what its look says, but for what output settings have a say in; returns the look."""
     look = json.loads(made.get(LIKE) or "{}")
-    said = {f"visible_{ray}": False for ray in look.get("off", ())} | {
-        n: look[n] for n in (*_FLAGS, *_OWN) if n in look
-    }
+    said = {name: look[name] for name in (*_FLAGS, *_OWN) if name in look}
+    said |= {f"visible_{ray}": False for ray in look.get("off", ())}
     for name, value in said.items():
         if getattr(made, name) != value:  # each change makes Blender list all objects anew
             setattr(made, name, value)
@@ -107,6 +101,11 @@ def wear(made: bpy.types.Object) -> dict[str, Any]:
         if name in look and getattr(made.light_linking, name) is None:
             found = next((c for c in bpy.data.collections if c.name_full == look[name]), None)
             setattr(made.light_linking, name, found)
+    if "carried_by" in look and not made.constraints:
+        name, here = look["carried_by"]
+        carried = made.constraints.new('CHILD_OF')
+        carried.target = next((o for o in bpy.data.objects if o.name_full == name), None)
+        carried.inverse_matrix = Matrix(here).inverted_safe()
     return look
 
 

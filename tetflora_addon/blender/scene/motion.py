@@ -28,18 +28,6 @@ def exposure(scene: bpy.types.Scene) -> tuple[float, float]:
     return first, first + scene.render.motion_blur_shutter
 
 
-def moves(obj: bpy.types.Object | None) -> bool:
-    """Whether an action moves an object or one of its parents, and motion blur is on for it."""
-    if obj is not None and not getattr(getattr(obj, "cycles", None), "use_motion_blur", True):
-        return False
-    while obj is not None:
-        animation = obj.animation_data
-        if animation is not None and animation.action is not None and animation.action_slot is not None:
-            return True
-        obj = obj.parent
-    return False
-
-
 def bags_of(datablock: bpy.types.ID) -> list[bpy.types.ActionChannelbag]:
     """What holds the curves of a datablock's action."""
     animation = datablock.animation_data
@@ -66,7 +54,7 @@ def moment(frame: float) -> Iterator[None]:
 
 def _displaced(frame: float, obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Floats:
     """Matrix (4, 4) that takes an object from where it is now to where it is at a frame."""
-    if not moves(obj):
+    if not attributes.moves(obj):
         return np.eye(4)
     outer = np.eye(4) if obj.parent is None else _displaced(frame, obj.parent, depsgraph)
     now, then = (_animated_basis(obj, at) for at in (depsgraph.scene.frame_current_final, frame))

@@ -155,7 +155,7 @@ def view_layer_groups(scene: bpy.types.Scene) -> list[list[bpy.types.ViewLayer]]
     for layer in layers:
         rendered = list(renderable_objects(layer))
         if any(may_take_part(o) for o in rendered):
-            looks = LayerLooks(layer)
+            looks = LayerLooks(layer, viewports=False)
             held = frozenset(
                 (o.session_uid, looks.of(o)) for o in rendered if may_take_part(o) or o.tetflora.is_occluder
             )

@@ -22,14 +22,14 @@ from ...growth.seasons import is_gone
 from ...growth.seeds import Seeds, crown_shapes
 from ...growth.wind import rotation_vectors
 from ...species.kinds import Kind, species_of
-from ..attributes import frames_of, world_matrix
+from ..attributes import frames_of, moves, world_matrix
 from ..settings import season_of
 from ..species.asset_species import asset_of, asset_species, find_asset, name_of
 from ..species.edits import catalog, edited_infos, species_for
 from .ages import Part, classed
 from .fields import read_aged_field, read_field_matrices, stored_ages
 from .looks import LayerLooks
-from .motion import exposure, moment, moves
+from .motion import exposure, moment
 from .objects import Copies, copies_of, is_drop, may_instance, may_take_part, name_keys, renderable_objects
 from .skeletons import kind_of, kind_of_choice
 
@@ -243,18 +243,18 @@ def read_asset_plants(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) ->
     if not assets:
         return []
     objects = sorted(renderable_objects(depsgraph.view_layer), key=lambda o: o.name_full)
-    single: dict[str, list[bpy.types.Object]] = {}
-    fields, drops = [], []
+    single: dict[tuple[str, str], list[bpy.types.Object]] = {}
+    looks, fields, drops = LayerLooks(depsgraph.view_layer), [], []
     for obj in objects:
         group = obj.tetflora
         if group.is_plant and group.enabled and group.species in assets:
-            single.setdefault(group.species, []).append(obj)
+            single.setdefault((group.species, looks.of(obj, model=True)), []).append(obj)
         elif group.is_field and group.enabled:
             fields.append(obj)
         elif is_drop(obj):
             drops.append(obj)
     found = []
-    for species, owners in single.items():
+    for (species, _), owners in single.items():
         seed = np.array([o.tetflora.seed for o in owners], dtype=np.int64)
         matrices = np.array([world_matrix(o, depsgraph) for o in owners], dtype=np.float64)
         found.append(AssetPlants(species, tuple(owners), seed, matrices))

@@ -4,8 +4,8 @@
 
 A list of the scene holds them, each with an identifier as species files have, and not the objects themselves: what is
 linked from a library cannot be written to. As with edits of species, those of the scene at hand come before those of
-the file's other scenes. What of their measures plants need, such as the size of the crown, is measured when an object
-becomes a species and when plants are placed; panels only read it.
+the file's other scenes, and those that came with collections of plants last (`edits.pack`). What of their measures
+plants need, such as the size of the crown, is measured when an object becomes a species and when plants are placed.
 """
 
 import base64
@@ -63,8 +63,10 @@ def listed_in(entries: str, scene: bpy.types.Scene | None = None) -> Iterator[An
 
 
 def entries_of(scene: bpy.types.Scene | None = None) -> Iterator[TetFloraAssetSpecies]:
-    """Asset species of this file, those of a scene first."""
-    return listed_in("asset_species", scene)
+    """Asset species of this file, those of a scene first, those that collections of plants brought last."""
+    yield from listed_in("asset_species", scene)
+    for home in getattr(bpy.data, "collections", ()):
+        yield from (entry for entry in home.tetflora_assets if is_identifier(entry.identifier))
 
 
 def find_asset(scene: bpy.types.Scene | None, identifier: str) -> TetFloraAssetSpecies | None:
@@ -84,8 +86,8 @@ def _living(entry: TetFloraAssetSpecies, references: Counter[bpy.types.Object]) 
 
     It stays in the file as long as anything refers to it, and be it only these lists.
     """
-    if entry.object is None:
-        return entry.collection
+    if entry.object is None or entry.id_data.library is not None:
+        return entry.object or entry.collection
     return entry.object if entry.object.users > references[entry.object] else None
 
 
@@ -107,6 +109,14 @@ def asset_species(scene: bpy.types.Scene | None = None) -> dict[str, TetFloraAss
 def asset_of(datablock: Datablock, scene: bpy.types.Scene | None = None) -> TetFloraAssetSpecies | None:
     """The species that an object or a collection is."""
     return next((entry for entry in entries_of(scene) if datablock in (entry.object, entry.collection)), None)
+
+
+def copy_asset(source: TetFloraAssetSpecies, entries: bpy.types.bpy_prop_collection) -> None:
+    """Add an asset species to a list as it is in another."""
+    added = entries.add()
+    for prop in source.bl_rna.properties:
+        if not prop.is_readonly:
+            setattr(added, prop.identifier, getattr(source, prop.identifier))
 
 
 def asset_infos() -> dict[str, SpeciesInfo]:
@@ -160,6 +170,4 @@ def picture_of(entry: TetFloraAssetSpecies) -> NDArray[np.uint8] | None:
         pixels = unpack.decompress(base64.b85decode(entry.picture.encode()), size)
     except (ValueError, zlib.error):
         return None
-    if len(pixels) != size:
-        return None
-    return np.frombuffer(pixels, np.uint8).reshape(PICTURE_SIDE, PICTURE_SIDE, 4)
+    return np.frombuffer(pixels, np.uint8).reshape(PICTURE_SIDE, PICTURE_SIDE, 4) if len(pixels) == size else None

@@ -41,7 +41,7 @@ from ...species.species import Species
 from ..declare import string
 from ..preferences import species_folders
 from ..runtime import Handlers, Listeners
-from .asset_species import asset_infos, find_asset, listed_in, name_of, refuse_asset
+from .asset_species import asset_infos, asset_species, copy_asset, find_asset, listed_in, name_of, refuse_asset
 
 #: Custom property of collections: JSON of species by their identifiers, see `pack`.
 PAGES = "tetflora_pages"
@@ -367,8 +367,9 @@ def pack(_path: object = None, _other: object = None) -> None:
     shipped = builtin_folder()
     own = {name for name, info in listed().items() if info.path.parent != shipped}
     own |= {edit.identifier for edit in edits_of_scenes(None)}
+    assets = asset_species()
     for collection in bpy.data.collections:
-        if collection.library is not None or not (own or PAGES in collection):
+        if collection.library is not None or not (own or assets or PAGES in collection):
             continue
         plants = [group for obj in collection.objects if (group := obj.tetflora).is_plant or group.is_field]
         needed = {name for plant in plants for name in (plant.species, *(e.species for e in plant.field_species))}
@@ -380,6 +381,11 @@ def pack(_path: object = None, _other: object = None) -> None:
         text = json.dumps(pages, ensure_ascii=False)
         if collection.get(PAGES, "{}") != text:
             collection[PAGES] = text
+        held = collection.tetflora_assets
+        for index in [i for i, entry in enumerate(held) if entry.identifier not in needed][::-1]:
+            held.remove(index)
+        for name in sorted(assets.keys() & needed - {entry.identifier for entry in held}):
+            copy_asset(assets[name], held)
 
 
 def _on_import(context: bpy.types.BlendImportContext, _other: object = None) -> None:
@@ -391,6 +397,9 @@ def _on_import(context: bpy.types.BlendImportContext, _other: object = None) -> 
                 if all(page.identifier != edit.identifier for edit in edits_of_scenes(scene)):
                     with suppress(ValueError, SpeciesError):
                         store_species(scene, page.identifier, json.loads(page.text))
+            for entry in item.id.tetflora_assets:
+                if entry.object is not None:
+                    entry.object.use_fake_user = True  # nothing else may hold it here
 
 
 _HANDLERS = Handlers(save_pre=pack, blend_import_post=_on_import)

@@ -157,9 +157,7 @@ def tick() -> float | None:
             raise
     finally:
         _state.working = False
-    if not more:
-        return None
-    return SLICE if _state.waiting else 0.001
+    return None if not more else SLICE if _state.waiting else 0.001
 
 
 def _begin(scene: bpy.types.Scene) -> bool:

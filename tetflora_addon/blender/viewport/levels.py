@@ -34,6 +34,7 @@ from ...preview.light_plants import (
 )
 from ...preview.running import InView, in_view, shown
 from ...refinement.loop import refine as refine_loop
+from ...species.kinds import Kind
 from ..job.contents import bind_steps, compile_for, in_year, load_for, memory_left, read_scene, refinement_settings
 from ..main_thread import on_main_thread
 from ..runtime import Handlers, JobData, call_off, call_soon, in_order, job, listening, redraw
@@ -100,12 +101,10 @@ def read_shapes(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> Shape
     What is wrong with a plant is reported by `Preview.message`, for the panel, and the earlier plants stay.
     """
     begin, preview, form = time.thread_time(), of(scene), scene.tetflora.preview.plants
-    preview.message, preview.objects, preview.moment = "", len(scene.objects), _moment(scene)
+    preview.message, preview.objects, preview.moment = "", _visible(depsgraph.view_layer), _moment(scene)
     try:
-        if form == 'NONE':
-            preview.shapes = None
-        else:
-            preview.shapes = _shapes_of(scene, depsgraph, light_plants if form == 'LIGHT' else bounds_of_plants)
+        make = light_plants if form == 'LIGHT' else bounds_of_plants
+        preview.shapes = None if form == 'NONE' else _shapes_of(scene, depsgraph, make)
     except NoPlantsError as error:
         preview.shapes, preview.message = None, str(error)
     except TetFloraError as error:
@@ -122,7 +121,7 @@ def _shapes_of(
     """Plants that grow in the form of ``make``, and those that are assets as simple crowns."""
     crowns = _asset_crowns(scene, depsgraph, boxes=make is bounds_of_plants)
     try:
-        seeds, _, of(scene).message = read_plants(scene, depsgraph)
+        seeds, of(scene).message = _plants_of(scene, depsgraph)
     except NoPlantsError:
         if not crowns:
             raise
@@ -131,11 +130,27 @@ def _shapes_of(
     return joined([*grown, *crowns]) if crowns or len(grown) > 1 else grown[0]
 
 
+def _visible(layer: bpy.types.ViewLayer) -> int:
+    """How many objects viewports show of a view layer."""
+    return sum(obj.visible_get(view_layer=layer) for obj in layer.objects)
+
+
+def _plants_of(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> tuple[Seeds, str]:
+    """Plants that grow and are not hidden in viewports, and which are left out."""
+    seeds, _, message = read_plants(scene, depsgraph)
+    seen = np.array(["hide_viewport" not in Kind.read(kind).look for kind in seeds.identifiers])
+    if not seen.any():
+        raise NoPlantsError("All plants are hidden in viewports; show them or their collections in the Outliner")
+    return seeds.take(seen[seeds.species]), message
+
+
 def _asset_crowns(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, boxes: bool) -> list[Shapes]:
     found = []
     for plants in read_asset_plants(scene, depsgraph):
-        crown = crown_for(scene, plants.species)
-        found.append(simple_crowns(plants.matrices, (crown.radius, crown.base, crown.height), crown.color, boxes))
+        crown, layer = crown_for(scene, plants.species), depsgraph.view_layer
+        seen = plants.matrices[[owner.visible_get(view_layer=layer) for owner in plants.owners]]
+        if len(seen):
+            found.append(simple_crowns(seen, (crown.radius, crown.base, crown.height), crown.color, boxes))
     return found
 
 
@@ -207,17 +222,13 @@ def _on_update(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
     for update in depsgraph.updates:
         datablock = update.id
         if isinstance(datablock, bpy.types.Object):
-            own = datablock.original.tetflora
-            shown = own.is_plant or own.is_field or is_drop(datablock.original)
-            if shown and (update.is_updated_transform or update.is_updated_geometry):
-                schedule()
-                return
-        # Deleted objects are reported only as updates of what they were in.
-        elif (
-            preview is not None
-            and isinstance(datablock, (bpy.types.Scene, bpy.types.Collection))
-            and (len(scene.objects) != preview.objects or preview.moment != _moment(scene))
-        ):
+            own, placed = datablock.original.tetflora, update.is_updated_transform or update.is_updated_geometry
+            changed = placed and (own.is_plant or own.is_field or is_drop(datablock.original))
+        else:  # objects that are deleted or hidden are reported only as updates of what they are in
+            known = preview is not None and isinstance(datablock, bpy.types.Scene | bpy.types.Collection)
+            now = (_visible(depsgraph.view_layer), _moment(scene)) if known and not timeline_moves() else None
+            changed = now is not None and now != (preview.objects, preview.moment)
+        if changed:
             schedule()
             return
 
@@ -258,12 +269,13 @@ def follow(
     try:
         running, known = preview.running, (stand_years(scene), gone_species(scene))
         if running is None or running.known != known or _moved(depsgraph):
-            others, (seeds, _, _) = _asset_crowns(scene, depsgraph, False), read_plants(scene, depsgraph)
+            others, (seeds, _) = _asset_crowns(scene, depsgraph, False), _plants_of(scene, depsgraph)
             running = preview.running = Running(seeds, others, known)
         if running.seen is None or not np.array_equal(running.views, views):
             running.seen, running.views = in_view(running.seeds, views), views
         seen, others = running.seen, running.others
-        make = light_plants if len(running.seeds) <= MOST_FACES else lambda *some: with_faces(crowns_of(*some))
+        # Of very many, plants are as those are that look largest among them.
+        make = light_plants if len(running.seeds) <= MOST_FACES else lambda *given: with_faces(crowns_of(*given))
         parts = [*_grown(scene, depsgraph, make, seen.seeds, seen), *others]
     except TetFloraError:  # which is told when all are read
         return

@@ -56,7 +56,7 @@ class Preview:
     looked: tuple = ()  # how the scene's camera was then, see `camera_now`
     frozen: Camera | None = None  # camera that stays whatever becomes of the scene's
     shapes: Shapes | None = None  # all plants in the form that is chosen
-    objects: int = 0  # objects of the scene when they were read
+    objects: int = 0  # that viewports showed when they were read
     moment: tuple = ()  # its day of the year and years then
     running: Running | None = None  # what is read once while the timeline runs
     message: str = ""  # why plants cannot be shown; empty if they can
