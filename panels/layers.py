@@ -272,6 +272,6 @@ def _draw_stand(layout: bpy.types.UILayout, field: bpy.types.Object) -> None:
     if entry := active_in(stand, "species"):
         layout.prop(entry, "incoming_seeds")
     if body := section(layout, "Site"):
-        draw_properties(body.column(align=True), stand, "recruits", "outside", "disturbance")
+        draw_properties(body.column(align=True), stand, "recruits", "outside")
         draw_properties(body.column(align=True), stand, "degree_days", "coldest_month")
         draw_properties(body.column(align=True), stand, "moisture", "relief", "fertility")

@@ -522,7 +522,7 @@ class StandSettings:
         "Factor on the seeds that arrive from beyond the ground; at 0, only the stand itself bears seeds",
         **within(0.0, 10.0),
     )
-    disturbance: int = setting(0, "Disturbance", "Years before the end when all trees die; 0: never", min=0, max=2000)
+    disturbance: int = script_setting(0, min=0, max=2000)  # years before the end when all trees die; 0: never
     min_height: float = script_setting(1.0, min=0.0)  # meters; lower plants are not part of the result
     cell: float = script_setting(1.0, min=0.1)  # width, meters, of the columns in which light is computed
     #: Light comes in from all sides, as at the edge of a wood. Otherwise the stand goes on beyond the ground, and what

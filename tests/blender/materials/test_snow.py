@@ -131,9 +131,22 @@ def test_leaves_facets_and_spheres_of_the_same_kind_are_as_white(amount):
     made = _sheet(leaf)
     real = _mean()
     made.data.materials[0] = facet
-    # Of what is white, facets return the part that leaves of a cluster leave to each other.
-    kept = np.divide(snow._CLUSTER[:3], snow.WHITE[:3])
-    np.testing.assert_allclose(_mean(), kept * real, atol=0.03)
+    np.testing.assert_allclose(_mean(), real, atol=0.03)
+
+
+def test_leaves_of_a_cluster_shade_each_others_snow():
+    """Where most of a cluster is hidden, little of the light that one leaf scatters gets out of it."""
+    small_scene(sky=1.0, samples=32)
+    _year(1.0)
+    facet = materials.proxy_material()
+    snow.fit([facet])
+    seen = []
+    for dull in (0.0, 0.3, 0.6):
+        _sheet(facet, tf_dull=dull).location.z = dull  # above the others
+        seen.append(_mean())
+    for dull, one in zip((0.3, 0.6), seen[1:], strict=True):
+        white = np.array(snow.WHITE[:3])
+        np.testing.assert_allclose(one / seen[0], (1.0 - dull) / (1.0 - 0.5 * dull * white), atol=0.03)
 
 
 @pytest.mark.parametrize(
