@@ -124,8 +124,8 @@ def snow_group() -> bpy.types.NodeTree:
         held = _held(graph, upward, given["Carry"] * (thin * (_TWIG - 1.0) + 1.0))
         above = upward > 0.0
         kept = held * graph.math('MAXIMUM', above, through)
-        # What it scatters up meets undersides: half of what light meets next is white. A wood of spruces is 12 % brighter
-        # than its truth so, and 18 % where all is.
+        # What it scatters up meets undersides: half of what light meets next is white. A wood of spruces is 12 %
+        # brighter than its truth so, and 18 % where all is.
         white, hidden = given["Snow Color"], graph.attribute("tf_dull", "Fac")
         white = white * (hidden * -1.0 + 1.0) / (white * (hidden * -0.5) + (1.0, 1.0, 1.0))
         snow = graph.node("ShaderNodeBsdfDiffuse", {"Color": white * above, "Roughness": _ROUGH})
