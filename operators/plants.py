@@ -82,9 +82,8 @@ class TETFLORA_OT_select_plants(Reporting, bpy.types.Operator):
             if not self.species and (active is None or not active.tetflora.is_plant):
                 return self.failed("The active object must be a plant; select one")
             self.species = self.species or active.tetflora.species
-            found = [
-                o for o in plant_objects.plants_of(context.view_layer.objects) if o.tetflora.species == self.species
-            ]
+            every = plant_objects.plants_of(context.view_layer.objects)
+            found = [o for o in every if o.tetflora.species == self.species]
         if not self.extend:
             for obj in context.selected_objects:
                 obj.select_set(False)
@@ -116,9 +115,8 @@ class TETFLORA_OT_remove_plants(Reporting, bpy.types.Operator):
 
     def run(self, context: bpy.types.Context) -> set[str]:
         objects = context.selected_objects if self.which == 'SELECTED' else context.scene.objects
-        plants = [
-            o for o in plant_objects.plants_of(objects) if self.which != 'SPECIES' or o.tetflora.species == self.species
-        ]
+        every = plant_objects.plants_of(objects)
+        plants = [o for o in every if self.which != 'SPECIES' or o.tetflora.species == self.species]
         fields = [] if self.which == 'SPECIES' else fields_of(objects)
         local = [o for o in (*plants, *fields) if o.library is None]
         if (plants or fields) and not local:

@@ -210,14 +210,8 @@ class SceneSwitch:
         soon: float,
         drawn: bool,
     ) -> None:
-        self._about, self._make, self._clear, self._soon, self._drawn, self._took = (
-            (name, label, tooltip),
-            make,
-            clear,
-            soon,
-            drawn,
-            0.0,
-        )
+        self._about, self._make, self._clear = (name, label, tooltip), make, clear
+        self._soon, self._drawn, self._took = soon, drawn, 0.0
         self.scene: int | None = None
         self.refresh = partial(self._refresh)  # one object, which Blender can find again
 

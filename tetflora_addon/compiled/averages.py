@@ -377,9 +377,8 @@ def shaped_totals(rows: Table, totals: Averages, polygons: Floats) -> ShapedTota
         own[:, 0, _LEAF_FACES] += totals.leaves[i, i] * polygons[i] * kinds[i]
         own[:, 0, _FACES] += totals.fixed_faces[i, i]
         own[:, 0, _WOOD] += totals.fixed_wood[i, i]
-        below, above = crown_effects.trunk_length_factors(
-            _BASES, rows["part"][np.argmax(rows["species"] == rows["species"][i]), 1]
-        )
+        trunk = np.argmax(rows["species"] == rows["species"][i])
+        below, above = crown_effects.trunk_length_factors(_BASES, rows["part"][trunk, 1])
         stretch = above if rows["continues"][i] else below
         for sort in np.flatnonzero(rows["next"][i] >= 0):
             j = rows["next"][i, sort]

@@ -10,7 +10,7 @@ of which lies behind full pixels as a whole.
 
 import itertools
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -116,11 +116,10 @@ class Drawing:
     shadows: ShadowReach
     shade: Shade
     occluders: Floats  # (t, 3, 3): triangles of opaque polygons, meters
+    covered: Floats  # (columns,): pixels in each column of the image that the loop found covered
     form: FacetConverter | None = None  # what becomes of facets where they are made; without, they stay what they are
     most: float = np.inf  # polygons and facets that there may be, should what is expected be wrong
     shadow: float = 0.0  # pixels down to which shadows of what is not seen are refined; 0 leaves them coarse
-    #: (columns,): pixels in each column of the image that the loop found covered.
-    covered: Floats = field(default_factory=lambda: np.zeros(0))
 
 
 def drawing(
@@ -156,7 +155,7 @@ def drawing(
         parts.append(rows := FaceRows.of(polygons))
         occluders = np.concatenate([occluders, faces.triangles(rows, TILE / 2)])
     covered = _covered_columns(result, camera)
-    return Drawing(kinds, parts, camera, facet, hidden, shadows, shade, occluders, form, most, shadow, covered)
+    return Drawing(kinds, parts, camera, facet, hidden, shadows, shade, occluders, covered, form, most, shadow)
 
 
 def _covered_columns(result: Refinement, camera: Camera) -> Floats:
@@ -290,8 +289,8 @@ class _Tile(Canvas):
         if len(given.occluders):
             self.add_shown(given.occluders)
         for slabs in frontier.slabs(parts, _SLAB * most):
-            self.uneven = max(self.uneven, self._coarser(most) / UNEVEN)
-            times, before = larger * self._coarser(most), self.number
+            coarser, before = self._coarser(most), self.number
+            self.uneven, times = max(self.uneven, coarser / UNEVEN), larger * coarser
             frontier.facet, frontier.kinds = times * given.facet, [kind.coarser(times) for kind in given.kinds]
             for number, (kind, slab) in enumerate(zip(frontier.kinds, slabs, strict=True)):
                 if self.number > _FULL * most:

@@ -153,9 +153,8 @@ def facet_blocks(refined: EmissionInput) -> Iterator[Buffers]:
         triangles = [some for some, _ in parts if isinstance(some, primitives.Triangles)]
         spheres = [some for some, _ in parts if isinstance(some, primitives.Spheres)]
         if triangles:
-            yield replace(
-                primitives.triangle_mesh(primitives.joined(triangles)), species=parts.species, look=parts.look
-            )
+            mesh = primitives.triangle_mesh(primitives.joined(triangles))
+            yield replace(mesh, species=parts.species, look=parts.look)
         if spheres:
             yield replace(primitives.sphere_points(primitives.joined(spheres)), species=parts.species, look=parts.look)
 

@@ -77,9 +77,8 @@ def on_render_pre(scene: bpy.types.Scene, _depsgraph: object = None) -> None:
     made = False
     try:
         wanted = scene.tetflora.refine_at_render and scene.tetflora.output.show_render
-        if wanted and (
-            has_contents(scene) or hiding.hidden_originals(scene)
-        ):  # those may be in no collection meanwhile
+        # What is hidden may be in no collection meanwhile.
+        if wanted and (has_contents(scene) or hiding.hidden_originals(scene)):
             make = partial(_make, scene)
             with looked_at_once():
                 if window_draws():

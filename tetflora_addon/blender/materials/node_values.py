@@ -85,6 +85,21 @@ STEPS = {'LESS_THAN', 'GREATER_THAN', 'COMPARE', 'SIGN', 'ROUND', 'FLOOR', 'CEIL
 STEPS |= {'MODULO', 'FLOORED_MODULO', 'WRAP', 'SNAP', 'PINGPONG', 'POWER', 'MINIMUM', 'MAXIMUM'}
 
 
+def _overlay(a: Values, b: Values, t: Values) -> Values:
+    low = a * ((1 - t) + 2 * t * b)
+    return np.where(a < 0.5, low, 1 - ((1 - t) + 2 * t * (1 - b)) * (1 - a))
+
+
+def _burn(a: Values, b: Values, t: Values) -> Values:
+    under = 1 - t + t * b
+    return np.where(under <= 0, 0, np.clip(1 - _ratio(1 - a, np.broadcast_to(under, a.shape)), 0, 1))
+
+
+def _dodge(a: Values, b: Values, t: Values) -> Values:
+    under = 1 - t * b
+    return np.where(a == 0, 0, np.where(under <= 0, 1, np.minimum(_ratio(a, under), 1)))
+
+
 def _tinted(channels: tuple[int, ...]) -> Callable[[Values, Values, Values], Values]:
     """A mix by a factor with what has some of another color's hue, saturation and value; grays give no hue."""
 
@@ -117,12 +132,12 @@ BLENDS: dict[str, Callable[[Values, Values, Values], Values]] = {
     'MIX': lambda a, b, t: a + t * (b - a),
     'DARKEN': lambda a, b, t: a + t * (np.minimum(a, b) - a),
     'MULTIPLY': lambda a, b, t: a * (1 - t + t * b),
-    'BURN': lambda a, b, t: np.where(1 - t + t * b <= 0, 0, np.clip(1 - _ratio(1 - a, 1 - t + t * b), 0, 1)),
+    'BURN': _burn,
     'LIGHTEN': lambda a, b, t: a + t * (np.maximum(a, b) - a),
     'SCREEN': lambda a, b, t: 1 - (1 - t + t * (1 - b)) * (1 - a),
-    'DODGE': lambda a, b, t: np.where(a == 0, 0, np.where(1 - t * b <= 0, 1, np.minimum(_ratio(a, 1 - t * b), 1))),
+    'DODGE': _dodge,
     'ADD': lambda a, b, t: a + t * b,
-    'OVERLAY': lambda a, b, t: np.where(a < 0.5, a * (1 - t + 2 * t * b), 1 - (1 - t + 2 * t * (1 - b)) * (1 - a)),
+    'OVERLAY': _overlay,
     'SOFT_LIGHT': lambda a, b, t: (1 - t) * a + t * ((1 - a) * b * a + a * (1 - (1 - b) * (1 - a))),
     'LINEAR_LIGHT': lambda a, b, t: a + t * (2 * b - 1),
     'DIFFERENCE': lambda a, b, t: a + t * (np.abs(a - b) - a),

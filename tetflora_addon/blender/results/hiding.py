@@ -223,9 +223,8 @@ def adopt_copies() -> None:
     Copies inherit marks but not names, and what their originals hide is hidden for the scene that was copied.
     """
     for scene in bpy.data.scenes:
-        copies = [
-            c for c in output.result_collections(scene) if not is_ours(c) and (c[MADE], None) in bpy.data.collections
-        ]
+        every = output.result_collections(scene)
+        copies = [c for c in every if not is_ours(c) and (c[MADE], None) in bpy.data.collections]
         for collection in copies:
             every = [collection, *collection.objects, *(o.data for o in collection.objects if o.data is not None)]
             ours = [d for d in every if MADE in d and d.library is None]

@@ -35,9 +35,8 @@ class LayerLooks:
     def of(self, obj: bpy.types.Object, instancer: bpy.types.Object | None = None, model: bool = False) -> str:
         """The look of an object, or of its instances that another shows, whose collections and holdout then count."""
         found = self._read(mover := instancer or obj)
-        if (
-            model and self._layer.id_data.render.use_motion_blur and moves(mover)
-        ):  # it carries results, which are blurred
+        # What moves carries its results, which are blurred with it.
+        if model and self._layer.id_data.render.use_motion_blur and moves(mover):
             here = mover.evaluated_get(self._layer.depsgraph).matrix_world
             found["carried_by"] = mover.name_full, [list(row) for row in here]
         if instancer is not None:

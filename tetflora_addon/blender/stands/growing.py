@@ -215,9 +215,8 @@ def new_stand_steps(
     scene, grounds = data.scene, list(grounds)
     data.add_objects(grounds)
     # The field comes first, with the settings that its plants will grow by: those of the scene may change meanwhile.
-    field = fields.write_field(
-        name, np.zeros((0, 3)), np.zeros((0, 4)), *np.zeros((1, 0)), *np.zeros((2, 0), np.int32), ()
-    )
+    nothing = np.zeros((0, 3)), np.zeros((0, 4)), *np.zeros((1, 0)), *np.zeros((2, 0), np.int32), ()
+    field = fields.write_field(name, *nothing)
     mesh, made = field.data, False
     try:
         stand = field.tetflora.stand
