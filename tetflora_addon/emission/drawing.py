@@ -54,15 +54,16 @@ HIDDEN_A_PIXEL, OUTSIDE_A_PIXEL = 0.3, 0.2
 NEVER_TOO_MANY = 50_000.0
 #: Pixels down to which shadows that fall into the view are refined where nobody asks for finer ones, the optical depth
 #: in the shade up to which they are, leaves that a facet stands for there at least, and how many times as many there
-#: may be as of all else out of view. Without, crowns beside the image were too dense, and its borders in the shade
-#: (twice as many pixels were off beside the truth in ``benchmarks exact --cases edge --species birch --size 480x270``);
-#: with a third of this, a fifth more dark blobs at the edge of a wood of beeches and oaks, which lie at its border.
+#: may be as of all else out of view. Without, crowns beside the image shade its borders too much.
 SHADOW, LIT, LIT_LEAVES, LIT_TIMES = 4.0, 1.5, 3.0, 9.0
 #: Meters from which on shadows are the coarser the farther they fall: most of what they reach lies in other shade.
 FALLEN = 8.0
 #: Largest side of facets outside over their distance from the view; meters that count least, and from which on it grows
 #: faster. The same of those whose shadows fall into the view, over the meters that these fall, and the least of these.
 _BESIDE, _THROWN = (0.1, 8.0, 15.0), (0.02, 1.0)
+#: Largest side of facets outside, meters, and how many have it at least, of all. Those of plants 150 m behind an eye in
+#: a wood were spheres of up to 37 m, few and by chance; one of them shaded all that was seen.
+LARGEST_OUTSIDE, _LEAST_OUTSIDE = 3.0, 0.5
 #: Parts outside that are drawn at a time.
 _OUTSIDE_BATCH = 20_000
 #: Fraction of what a tile may have from which on all that is left counts as hidden, and part of that from which on the
@@ -81,7 +82,7 @@ _LEAST_SHARE = 0.1
 #: Part of all that may be drawn which plants out of view have.
 _UNSEEN = 0.05
 #: Draws of this module.
-_MERGE, _LEFT, _SCARCE = 230, 232, 234
+_MERGE, _LEFT, _SCARCE, _DROPPED = 230, 232, 234, 235
 
 #: What becomes of facets, which the camera sees or not. Another process may call it.
 FacetConverter = Callable[[Facets, bool], Any]
@@ -460,8 +461,8 @@ class _Tile(Canvas):
         leaves = 1.0 if self.given.shadow else LIT_LEAVES
         # Of what a limit leaves, all else has half (`_few`) and these have three times that, since they are opened.
         room = max(1.5 * (most - self.number), 0.0)
-        self._draw_unseen(fine, sides, min(LIT_TIMES * free, room), add, leaves)
-        self._draw_unseen(pools, list(map(self._sides_outside, pools)), few, add)
+        self._draw_unseen(fine, sides, min(LIT_TIMES * free, room), add, leaves, LARGEST_OUTSIDE)
+        self._draw_unseen(pools, list(map(self._sides_outside, pools)), few, add, largest=LARGEST_OUTSIDE)
 
     def _sides_outside(self, pool: Waiting) -> Floats:
         """Sides (n,) of facets of parts out of view, meters."""
@@ -502,20 +503,31 @@ class _Tile(Canvas):
         most: float,
         add: Callable[[Facets, Whose], None],
         leaves: float = HIDDEN_LEAVES,
+        largest: float = np.inf,
     ) -> None:
-        """Facets of parts that nobody sees, of sides (n,) in meters or so many leaves; no more than so many."""
+        """Facets of parts that nobody sees, of sides (n,) in meters or so many leaves; about so many at most.
+
+        Were there more, they are larger; where they would be larger than the largest, some parts have none.
+        """
         drawn = []
         for kind, pool, side in zip(self.given.kinds, pools, sides, strict=True):
             kept = kind.enough(pool.parts)
             side = np.maximum(self.given.hidden * side, np.sqrt(leaves * kind.one_leaf(pool.parts)))
-            drawn.append((kind, pool, side, kept, kept * kind.optical(pool.parts) / np.maximum(side, 1e-9) ** 2))
-        times = max(np.sqrt(float(sum(number.sum() for *_, number in drawn)) / max(most, 1.0)), 1.0)
-        for kind, pool, side, kept, number in drawn:
+            drawn.append((kind, pool, np.maximum(side, 1e-9), kept, kept * kind.optical(pool.parts)))
+        number = sum(float((area / side**2).sum()) for *_, side, _, area in drawn)
+        times = max(np.sqrt(number / max(most, 1.0)), 1.0)
+        numbers = [area / np.minimum(times * side, largest) ** 2 for *_, side, _, area in drawn]
+        large = [(times * side > largest) & (not kind.stays) for kind, _, side, _, _ in drawn]
+        of_large = sum(float(own[of].sum()) for own, of in zip(numbers, large, strict=True))
+        room = max(most - sum(float(own.sum()) for own in numbers) + of_large, _LEAST_OUTSIDE * most)
+        for (kind, pool, side, kept, _), own, of in zip(drawn, numbers, large, strict=True):
+            stay = ~of | (uniform(place_keys(pool.center), _DROPPED) * of_large < room)
             # Most parts have a small part of a facet each: so many fewer of them have so much more, which is as much.
-            scarce = (number > 0.0) & (number < 0.5 * times**2 / leaves) & (not kind.stays)
+            scarce = stay & (own > 0.0) & (own < 0.5 / leaves) & (not kind.stays)
             chosen = scarce & (uniform(place_keys(pool.center), _SCARCE) < 1.0 / leaves)
-            for more, some in ((1.0, np.flatnonzero(~scarce)), (np.sqrt(leaves), np.flatnonzero(chosen))):
-                given = pool.parts.take(some), times * side[some] / more, kept[some], self.frontier.shown
+            for more, some in ((1.0, np.flatnonzero(stay & ~scarce)), (np.sqrt(leaves), np.flatnonzero(chosen))):
+                size = np.minimum(times * side[some], largest) / more
+                given = pool.parts.take(some), size, kept[some], self.frontier.shown
                 for whose, facets in kind.unseen(*given) if len(some) else ():
                     add(replace(facets, side=more * facets.side), whose)
 

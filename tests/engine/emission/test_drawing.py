@@ -24,7 +24,7 @@ from tetflora_addon.emission.plants import GrownPlants, Transition, expanded_blo
 from tetflora_addon.growth.growth import trunks
 from tetflora_addon.proxies.facet_weights import facet_weights
 from tetflora_addon.proxies.microsurfaces import Facets
-from tetflora_addon.proxies.primitives import triangle_corners
+from tetflora_addon.proxies.primitives import joined, triangle_corners
 from tetflora_addon.refinement.contents import PlantParts, subplant_totals
 from tetflora_addon.refinement.lights import Light
 from tetflora_addon.refinement.settings import RefinementSettings
@@ -114,6 +114,23 @@ def test_no_facet_of_what_is_outside_is_in_the_image(lens: float) -> None:
     assert inside.any() and (~seen).any()
     assert pixels_of(facets, camera)[inside & ~seen].max(initial=0.0) < 6.0
     assert (inside & ~seen & (pixels_of(facets, camera) > 1.5)).sum() < 0.02 * inside.sum()
+
+
+@pytest.mark.parametrize(("most", "lost"), [(np.inf, 1e-6), (2e5, 0.15)])
+def test_what_stands_far_behind_the_eye_is_no_larger_than_a_crown(most: float, lost: float) -> None:
+    """No facet out of view is a roof over what is seen; all keep their area together, as far as there is room."""
+    flora, behind = support.alone("birch", BIRCH), support.grove(200, 8.0)
+    seeds = replace(behind, position=behind.position - np.array([0.0, 130.0, 0.0]))
+    camera = support.camera((0, 0, 1.7), (0, 30, 1.7), pixels=WIDTH, view=0.7)
+    result = replace(run(flora, seeds, camera)[1], lights=(SUN,))
+    scene = support.refined(flora, result, camera, 1.2, 0.6, weighted=False, most=most)
+    for _ in scene.mesh_blocks():
+        pass
+    facets = joined([some for parts in scene.facet_parts() for some, _ in parts])
+    assert 0.0 < facets.side.max() < 4.0
+    (kind,), (parts,) = scene.drawing.kinds, scene.drawing.parts
+    area = float((kind.enough(parts) * kind.optical(parts)).sum())
+    assert (facets.side**2).sum() == pytest.approx(area, rel=lost)
 
 
 @pytest.mark.parametrize(("away", "hidden"), [(2.5, 1.0), (6.0, 16.0)])
