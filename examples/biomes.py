@@ -129,8 +129,9 @@ VIEWS = {
 #: Names of the two cameras, and the height of winter's sun at most, degrees.
 EYE, FROM_ABOVE = CAMERAS = "Eye", "From Above"
 WINTER_SUN = 16.0
-#: From where all of the hectare is seen from above, as `View.eye` and `View.ahead`, its lens and the exposure's mean.
-ABOVE, BELOW, ABOVE_LENS, ABOVE_GRAY = (0.0, -95.0, 105.0), (0.0, 0.0, 0.0), 38.0, 0.4
+#: From where most of the hectare is seen from above, without its border, as `View.eye` and `View.ahead`, the lens and
+#: the exposure's mean.
+ABOVE, BELOW, ABOVE_LENS, ABOVE_GRAY = (0.0, -95.0, 105.0), (0.0, 0.0, 0.0), 64.0, 0.4
 
 
 #: The picture of the README: the wood of birches and pines against a low sun.

@@ -98,18 +98,22 @@ class Coverage:
         left, _, bottom, _ = camera.window
         scale = self._scale
         if camera.kind == "ORTHO":
-            reach = radius[:, None] * scale
+            reach = (radius, radius)
         elif camera.kind == "PANO":
             angle = np.arcsin(np.clip(radius / np.maximum(depth, 1e-9), 0.0, 1.0))
             own = camera.to_camera_space(center)
             cosine = np.hypot(own[:, 0], own[:, 2]) / np.maximum(depth, 1e-9)
-            reach = np.stack([angle / np.maximum(cosine - np.sin(angle), 1e-3), angle], axis=1) * scale
+            reach = (angle / np.maximum(cosine - np.sin(angle), 1e-3), angle)
         else:
             # The silhouette of a sphere beside the axis is an ellipse, longer by its slope.
-            slope = np.stack([column / scale[0] + left, row / scale[1] + bottom], axis=1)
-            reach = (radius / np.maximum(near, 1e-9))[:, None] * np.sqrt(1.0 + slope**2) * scale
-        place, reach = np.stack([column, row], axis=1), reach + self.blur(center, depth)[:, None]
-        low, high = place - reach, place + reach
+            steep, away = (column / scale[0] + left, row / scale[1] + bottom), radius / np.maximum(near, 1e-9)
+            reach = tuple(away * np.sqrt(1.0 + of * of) for of in steep)
+        blur = self.blur(center, depth)
+        # One side after the other in memory, as they are read (`hidden`).
+        low, high = np.empty((2, 2, len(near)), np.float32).transpose(0, 2, 1)
+        for side, (place, far) in enumerate(zip((column, row), reach, strict=True)):
+            far = far * scale[side] + blur
+            low[:, side], high[:, side] = place - far, place + far
         if camera.kind != "ORTHO":
             around = np.flatnonzero(near <= camera.near if camera.kind == "PERSP" else near <= 0.0)
             outside = around[camera.distance_to_view(center[around]) > radius[around]]
@@ -118,7 +122,7 @@ class Coverage:
         if camera.kind == "PANO":
             round_ = high[:, 0] - low[:, 0] > self.width / 2.0
             low[round_], high[round_] = -np.inf, np.inf
-        return Footprints(low.astype(np.float32), high.astype(np.float32), near.astype(np.float32))
+        return Footprints(low, high, near.astype(np.float32))
 
     def of_lines(self, start: Floats, end: Floats, radius: Floats, within: Footprints) -> Footprints:
         """Footprints of what reaches so far (n,) from lines between points (n, 3), within others (n,); meters.
@@ -154,8 +158,8 @@ class Coverage:
         column, row, depth = (v.reshape(k, n) for v in self.project(corners.transpose(1, 0, 2).reshape(-1, 3)))
         near = depth.min(axis=0)
         blur = self.blur(corners[:, 0], near)
-        low = np.stack([column.min(axis=0) - blur, row.min(axis=0) - blur], axis=1)
-        high = np.stack([column.max(axis=0) + blur, row.max(axis=0) + blur], axis=1)
+        low = np.stack([column.min(axis=0) - blur, row.min(axis=0) - blur]).T
+        high = np.stack([column.max(axis=0) + blur, row.max(axis=0) + blur]).T
         if self.camera.kind == "PERSP":
             around = near <= self.camera.near
             low[around], high[around] = -np.inf, np.inf
@@ -197,23 +201,22 @@ class Coverage:
         """Things (n,) behind full pixels wherever they are in the image; those outside are."""
         if self._maxima is None:
             self._maxima = _maxima(self.depth)
-        size, first = np.array([self.end - self.first, self.height]), np.array([self.first, 0])
+        # Numbers of one side after the other: numpy takes four times as long over pairs.
+        (left, bottom), (right, top), near = prints.low.T, prints.high.T, prints.near
         # Pixels that this buffer does not know of, and those of what reaches around the eye, may all be empty.
-        known = np.isfinite(prints.near) & ~((prints.low[:, 0] < self.first) & (self.first > 0))
-        known &= ~((prints.high[:, 0] > self.end) & (self.end < self.width)) & np.isfinite(prints.high[:, 0])
-        low, high = (
-            np.clip(np.floor(np.clip(of, -1.0, 1e9)) - first, 0, size - 1).astype(np.int64)
-            for of in (prints.low, prints.high)
-        )
-        level = np.frexp(np.maximum(*(high - low).T) + 1)[1] - 1
+        known = np.isfinite(near) & np.isfinite(right)
+        known &= ((left >= self.first) | (self.first == 0)) & ((right <= self.end) | (self.end == self.width))
+        height, wide = self.depth.shape
+        x0, x1 = (np.clip(of - self.first, 0.0, wide - 1.0).astype(np.int32) for of in (left, right))
+        y0, y1 = (np.clip(of, 0.0, height - 1.0).astype(np.int32) for of in (bottom, top))
+        level = np.frexp((np.maximum(x1 - x0, y1 - y0) + 1).astype(np.float32))[1] - 1
         # Four overlapping squares cover a rectangle, and more where one side is much longer.
-        last = np.maximum(high - (1 << level)[:, None] + 1, low)
-        farthest = np.zeros(len(low), np.float32)
-        for row in (low[:, 1], last[:, 1]):
-            row = (level * self.height + row) * size[0]
-            for column in (low[:, 0], last[:, 0]):
+        less, base = (np.int32(1) << level) - 1, level.astype(np.int64) * height
+        farthest = np.zeros(len(near), np.float32)
+        for row in ((base + y0) * wide, (base + np.maximum(y1 - less, y0)) * wide):
+            for column in (x0, np.maximum(x1 - less, x0)):
                 np.maximum(farthest, np.take(self._maxima, row + column), out=farthest)
-        return ((farthest < prints.near) & known) | self.outside(prints)
+        return ((farthest < near) & known) | self.outside(prints)
 
     def draw(self, column: NDArray, row: NDArray, depth: NDArray) -> None:
         """Fill pixels whose centers triangles cover, given the columns, rows and depths (3, n) of their corners."""
@@ -256,7 +259,7 @@ def _projected(camera: Camera, points: NDArray[np.floating], scale: Floats) -> t
     elif camera.kind == "PERSP":
         ahead = np.maximum(depth, 1e-6)
         across, up = across / ahead, up / ahead
-    return (across - left) * scale[0], (up - bottom) * scale[1], depth
+    return (across - left) * float(scale[0]), (up - bottom) * float(scale[1]), depth
 
 
 def _covered(column: NDArray, row: NDArray, depth: NDArray, t: NDArray, x: NDArray, y: NDArray) -> tuple[Mask, Floats]:

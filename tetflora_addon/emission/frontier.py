@@ -57,6 +57,43 @@ class Waiting(Arrays):
     count: Floats  # (n,): facets that they would have, all of them
 
 
+class _Pool:
+    """Parts (n) of one kind that wait, in runs: what has left is cleared, and what came is joined, only now and then."""
+
+    def __init__(self, first: Waiting) -> None:
+        self._runs = [(first, np.arange(len(first)))]
+
+    def __len__(self) -> int:
+        return sum(len(rows) for _, rows in self._runs)
+
+    def column(self, name: str) -> NDArray:
+        """A column (n,) of `Waiting`."""
+        return np.concatenate([getattr(run, name)[rows] for run, rows in self._runs])
+
+    def _within(self, index: Integers) -> list[tuple[Waiting, Integers]]:
+        """Each run, and its rows among some (k,) of all."""
+        ends = np.cumsum([0, *(len(rows) for _, rows in self._runs)])
+        of = np.searchsorted(ends, index, side="right") - 1
+        return [(run, rows[index[of == k] - ends[k]]) for k, (run, rows) in enumerate(self._runs)]
+
+    def take(self, index: Integers) -> Waiting:
+        """Some (k,) of them."""
+        return Waiting.concatenate([run.take(rows) for run, rows in self._within(index)])
+
+    def keep(self, index: Integers, later: Sequence[Waiting]) -> int:
+        """Only some (k,) wait still, and others do from now on; how many there were."""
+        number, self._runs = len(self), self._within(index)
+        self._runs += [(new, np.arange(len(new))) for new in [Waiting.concatenate(later)] if len(new)] if later else []
+        for k in range(len(self._runs) - 1, -1, -1):
+            run, rows = self._runs[k]
+            if k and 2 * len(rows) > len(self._runs[k - 1][1]):
+                run = Waiting.concatenate([of.take(some) for of, some in self._runs[k - 1 : k + 1]])
+                self._runs[k - 1 :] = [(run, np.arange(len(run))), *self._runs[k + 1 :]]
+            elif 2 * len(rows) < len(run):
+                self._runs[k] = run.take(rows), np.arange(len(rows))
+        return number
+
+
 class Canvas:
     """Where kinds draw what is seen of them: a tile of the image."""
 
@@ -216,19 +253,21 @@ class Frontier:
 
         In each cell of the image these are the nearest ones, which have no more than about so many facets in all.
         """
-        pools = list(map(self.pool, self.kinds, parts))
-        cells = len(np.unique(np.concatenate([pool.cell for pool in pools])))
+        pools = [_Pool(self.pool(kind, own)) for kind, own in zip(self.kinds, parts, strict=True)]
+        cells = len(np.unique(np.concatenate([pool.column("cell") for pool in pools])))
         dense = min(SLAB * CELL**2, FIRST * most / max(cells, 1))
         for pool, *left in zip(pools, self.hidden, self.outside, strict=True):
             for one in left:
-                one.append(pool.take(slice(0)))
+                one.append(pool.take(np.arange(0)))
         while any(map(len, pools)):
-            depths, cells = self._depths(pools, dense)
-            ready = []
-            for number, (pool, depth) in enumerate(zip(pools, depths, strict=True)):
-                soon = np.flatnonzero(pool.near <= depth)
-                made, later = self._decided(number, pool.take(soon), depth[soon])
-                pools[number] = Waiting.concatenate([pool.take(np.flatnonzero(pool.near > depth)), *later])
+            near, depth, order, cells = self._depths(pools, dense)
+            ready, first = [], 0
+            for number, pool in enumerate(pools):
+                # In their order, so that the next sorting finds most of it done.
+                own = order[(order >= first) & (order < first + len(pool))]
+                begun = (near <= depth)[own]
+                made, later = self._decided(number, pool.take(own[begun] - first), depth[own[begun]])
+                first += pool.keep(own[~begun] - first, later)
                 ready.append(made)
             # Where much was hidden, or little is left, the next ones are so many more.
             wanted = min(max(SLAB * CELL**2 * cells, LEAST), max(most, 1.0))
@@ -237,10 +276,13 @@ class Frontier:
             if any(map(len, ready)):
                 yield ready
 
-    def _depths(self, pools: Sequence[Waiting], number: float) -> tuple[list[Floats], int]:
-        """Depths (n,) for parts, before which these have so many facets in each cell, about; and how many cells."""
+    def _depths(self, pools: Sequence["_Pool"], number: float) -> tuple[Floats, Floats, Integers, int]:
+        """Least depths (n,) of parts, and those before which they have so many facets in each cell, about.
+
+        Also their order (n,) by cell and depth, and how many cells there are.
+        """
         every, nearest, count, radius = (
-            np.concatenate([getattr(pool, name) for pool in pools]) for name in ("cell", "near", "count", "radius")
+            np.concatenate([pool.column(name) for pool in pools]) for name in ("cell", "near", "count", "radius")
         )
         deepest = float(np.ptp(nearest)) + 1.0
         order = np.argsort(every * deepest + (nearest - nearest.min()), kind="stable")
@@ -255,7 +297,7 @@ class Frontier:
         end = near[last] + 2.0 * radius[order][last] * np.minimum(left[last] / np.maximum(count[last], 1e-12), 1.0)
         depth = np.empty(len(cells))
         depth[order] = end[group]
-        return np.split(depth, np.cumsum([len(pool) for pool in pools])[:-1]), len(first)
+        return nearest, depth, order, len(first)
 
     def _decided(self, number: int, slab: Waiting, depth: Floats) -> tuple[Waiting, list[Waiting]]:
         """What is to be drawn of parts that begin before depths (n,), and what of theirs begins beyond."""
