@@ -82,15 +82,14 @@ class _Pool:
 
     def keep(self, index: Integers, later: Sequence[Waiting]) -> int:
         """Only some (k,) wait still, and others do from now on; how many there were."""
-        number, self._runs = len(self), self._within(index)
-        self._runs += [(new, np.arange(len(new))) for new in [Waiting.concatenate(later)] if len(new)] if later else []
-        for k in range(len(self._runs) - 1, -1, -1):
-            run, rows = self._runs[k]
-            if k and 2 * len(rows) > len(self._runs[k - 1][1]):
-                run = Waiting.concatenate([of.take(some) for of, some in self._runs[k - 1 : k + 1]])
-                self._runs[k - 1 :] = [(run, np.arange(len(run))), *self._runs[k + 1 :]]
-            elif 2 * len(rows) < len(run):
-                self._runs[k] = run.take(rows), np.arange(len(rows))
+        number, new = len(self), Waiting.concatenate(later) if later else self.take(np.arange(0))
+        self._runs = [*self._within(index), (new, np.arange(len(new)))]
+        for k in range(len(self._runs) - 1, 0, -1):
+            if 2 * len(self._runs[k][1]) >= len(self._runs[k - 1][1]):
+                joined = Waiting.concatenate([run.take(rows) for run, rows in self._runs[k - 1 : k + 1]])
+                self._runs[k - 1 : k + 1] = [(joined, np.arange(len(joined)))]
+            elif not len(self._runs[k][1]):
+                del self._runs[k]
         return number
 
 
