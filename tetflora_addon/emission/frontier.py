@@ -58,7 +58,7 @@ class Waiting(Arrays):
 
 
 class _Pool:
-    """Parts (n) of one kind that wait, in runs: what has left is cleared, and what came is joined, only now and then."""
+    """Parts (n) of one kind that wait, in runs: what leaves is cleared, and what comes is joined, only now and then."""
 
     def __init__(self, first: Waiting) -> None:
         self._runs = [(first, np.arange(len(first)))]
