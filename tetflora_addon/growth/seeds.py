@@ -54,7 +54,7 @@ WIDTH, BASE, EAST, NORTH, THICKNESS, LEAVES = range(6)
 PLAIN = np.array([1.0, 0.0, 0.0, 0.0, 1.0, 1.0])
 #: Limits of each column.
 LEAST = np.array([0.2, 0.0, -0.8, -0.8, 0.2, 0.01])
-MOST = np.array([3.0, 0.95, 0.8, 0.8, 5.0, 4.0])
+MOST = np.array([3.0, 0.95, 0.8, 0.8, 5.0, 6.0])
 
 
 def farthest(forms: Floats | None) -> Floats | float:

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from benchmarks.leaf_area import drawn_leaves
+from benchmarks.leaf_area import drawn_against_grid, drawn_leaves
 from devtools.leaf_area import allometry
 from tetflora_addon.growth.hashing import key_of_seed
 from tetflora_addon.species.catalog import load_species
@@ -31,3 +31,8 @@ def test_what_is_drawn_has_the_leaves_that_take_light(identifier: str) -> None:
     taken = plants.crowns(traits).leaves / traits.extinction[0]
     site = StandSite(0.0, 0.0, 5.0, np.zeros((2, 2)))
     assert drawn_leaves(identifier, plants, traits, site) == pytest.approx(taken, rel=0.05)
+
+
+def test_trees_with_few_twigs_have_as_many_between_neighbors_as_take_light() -> None:
+    """Shapes of crowns make up to six times as many; four were too few for tupelos of forty years."""
+    assert drawn_against_grid("black_tupelo", 40) < 0.01
