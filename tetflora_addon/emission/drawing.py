@@ -71,10 +71,11 @@ _OUTSIDE_BATCH = 20_000
 _FULL, _SPARE = 0.85, 0.75
 #: Least part of that which counts as left: facets have seven times the side then.
 _LEAST_LEFT = 0.005
-#: Largest sides in a tile over those that it began with, from which on it is drawn again, with the mean of them from
-#: the beginning: too little was left of its polygons for what lies behind, which would be shards among fine leaves. It
-#: begins with sides that grow at least by this power of what is too much, and is drawn so often at most.
-UNEVEN, _AGAIN, _TRIES = 2.0, 0.2, 5
+#: Largest sides in a tile over those that it began with, from which on it is drawn again, coarser from the beginning:
+#: too little was left of its polygons for what lies behind, which would be shards among fine leaves. Sides grow by this
+#: power of their mean (with all of it, 40 % of a tile's polygons were left), at least by this of what is too much; and
+#: it is drawn so often at most.
+UNEVEN, _MEAN, _AGAIN, _TRIES = 2.0, 0.7, 0.2, 5
 #: Part of what a tile may have that is made between two depths, at most.
 _SLAB = 0.06
 #: Part of what tiles have on average that each has besides.
@@ -244,7 +245,7 @@ def _drawn_tile(
         tile.draw(parts, (columns[1] - columns[0]) / tile.coverage.width, share * given.most, times)
         if max(tile.uneven, tile.over) <= 1.0:
             break
-        times = max(tile.coarser, times * max(tile.uneven, tile.over) ** _AGAIN)
+        times *= max((tile.coarser / times) ** _MEAN, max(tile.uneven, tile.over) ** _AGAIN)
     return tile.made(number)
 
 
