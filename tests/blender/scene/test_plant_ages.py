@@ -293,3 +293,17 @@ def test_ages_of_a_species_share_meshes(scene):
     meshes = [o for o in made.all_objects if o.type == 'MESH' and ("leaf" in o.name or "bark" in o.name)]
     assert {o.name for o in meshes} == {name for name in before if "leaf" in name or "bark" in name}
     assert sum(len(o.data.polygons) for o in meshes) == statistics.polygons_meshed
+
+
+def test_a_dead_tree_takes_no_bark_from_the_living(scene):
+    """Bark of the dead comes off; others of their species keep theirs, and both have a material of their own."""
+    scene.render.resolution_x = scene.render.resolution_y = 120
+    row_of_plants([300.0, 40.0], "birch")
+    for _ in range(2):
+        refine.refine(scene, depsgraph())
+        (made,) = result_collections(scene, 'VIEW')
+        shown = [slot.material for o in made.all_objects if " bark " in o.name for slot in o.material_slots]
+        barks = [node.node_tree.name for m in shown for node in m.node_tree.nodes if getattr(node, "node_tree", None)]
+        kinds = {name for name in barks if name.endswith(" Bark")}
+        assert kinds == {"TetFlora Fibrous Bark", "TetFlora Peeling Bark"}
+    assert {m.name for m in bpy.data.materials if " bark" in m.name} == {"TetFlora Birch bark", "TetFlora Birch dead bark"}

@@ -224,7 +224,8 @@ def materials_of(scene: bpy.types.Scene, species: Species, kind: str, form: int)
     if replaced is not None:
         return [replaced]
     if kind == "bark":
-        return [_in_viewports(bark_material(species.name, species.bark), species, kind)]
+        dead = species.aged is not None and species.bark != species.aged[0].bark
+        return [_in_viewports(bark_material(species.name + " dead" * dead, species.bark), species, kind)]
     own = _brought(scene, species.identifier, kind, form)
     return own if any(own) else [_in_viewports(species_leaf_material(species, kind), species, kind)]
 
