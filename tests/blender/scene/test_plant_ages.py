@@ -306,4 +306,7 @@ def test_a_dead_tree_takes_no_bark_from_the_living(scene):
         barks = [node.node_tree.name for m in shown for node in m.node_tree.nodes if getattr(node, "node_tree", None)]
         kinds = {name for name in barks if name.endswith(" Bark")}
         assert kinds == {"TetFlora Fibrous Bark", "TetFlora Peeling Bark"}
-    assert {m.name for m in bpy.data.materials if " bark" in m.name} == {"TetFlora Birch bark", "TetFlora Birch dead bark"}
+    assert {m.name for m in bpy.data.materials if " bark" in m.name} == {
+        "TetFlora Birch bark",
+        "TetFlora Birch dead bark",
+    }

@@ -253,7 +253,7 @@ def _write_blocks(run: _Run, blocks: Iterator[Block], start: float) -> Job[None]
 
 
 def _of_all_ages(run: _Run, blocks: Iterator[Block]) -> Iterator[Block]:
-    """Blocks of which those of one species, look and bark at several ages are one mesh: objects cost a renderer time."""
+    """Blocks of which those of one species, look and bark at several ages are one mesh: objects cost renderers time."""
     first: dict[tuple[str, str, str], int] = {}
     named = [(one.identifier, run.results.look_of(n), one.bark) for n, one in enumerate(run.flora.species)]
     same = [first.setdefault(named[n], n) if one.skeleton is None else n for n, one in enumerate(run.flora.species)]
