@@ -14,10 +14,12 @@ scene remembers all of it in a custom property.
 import json
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from functools import partial
 
 import bpy
 
 from ...errors import SceneError
+from ..main_thread import in_main_thread
 from ..materials.nodes import MADE, is_ours, is_own, tag, untag
 from ..scene.motion import curves_of
 from ..scene.objects import may_take_part
@@ -452,17 +454,21 @@ def originals_shown(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph | Non
             o.hide_render, o.hide_viewport = _marker(o, purpose)[0]
     layer = getattr(depsgraph, "view_layer", None)
     closed = {o: o.hide_get(view_layer=layer) for o in getattr(layer, "objects", ()) if _not_evaluated(o)}
+
+    def enable(on: bool) -> None:
+        for o, eye in closed.items():
+            o.hide_viewport = not on
+            o.hide_set(on or eye, view_layer=layer)
+
     try:
-        for o in closed:
-            o.hide_viewport = False
-            o.hide_set(True, view_layer=layer)
+        if closed:
+            in_main_thread(partial(enable, True))
         if (before or linked or closed) and layer is not None:
             depsgraph.update()
         yield
     finally:
-        for o, eye in closed.items():
-            o.hide_set(eye, view_layer=layer)
-            o.hide_viewport = True
+        if closed:
+            in_main_thread(partial(enable, False))
         for o, flags in before.items():
             o.hide_render, o.hide_viewport = flags
         for home, purpose, every in reversed(linked):

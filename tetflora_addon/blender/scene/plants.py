@@ -296,9 +296,7 @@ def _none_left(off: bool, unknown: list[str], fields: list[str], hidden: int) ->
             f"No plants to render; {hidden:,} are hidden in renders or excluded from the view layer. Enable them "
             "or their collections in the Outliner"
         )
-    return (
-        "No plants to render; add some with Add > TetFlora Plant, or with + under Layers in the sidebar's TetFlora tab"
-    )
+    return "No plants to render; add some with Add > TetFlora Plant, or with + under Layers in the TetFlora tab"
 
 
 def single_plants(plants: list[bpy.types.Object], depsgraph: bpy.types.Depsgraph) -> Seeds:
