@@ -14,9 +14,10 @@ sys.path.append(str(Path(__file__).resolve().parents[2]))
 from devtools.aliases import INSTALLED, alias
 
 alias(INSTALLED)
-from tests.blender.scenes import add_plant  # noqa: E402  (found only now)
+from tests.blender.scenes import add_mesh, add_plant  # noqa: E402  (found only now)
 from tetflora_addon.blender import main_thread  # noqa: E402
 from tetflora_addon.blender.job import refine, render  # noqa: E402
+from tetflora_addon.blender.results import hiding  # noqa: E402
 
 
 def steps(ui):
@@ -34,11 +35,17 @@ def steps(ui):
     scene.render.filepath = str(ui.out_dir / "frame_####")
     for i in range(3):
         add_plant(f"p{i}", seed=i, location=(3.0 * i, 3.0 * i, 0.0))
+    sheet = add_mesh("sheet")  # enabled for a moment while each frame is read
+    sheet.modifiers.new("array", 'ARRAY').count = 4
+    sheet.tetflora.is_explicit = sheet.hide_viewport = True
+    refine.refine(scene, bpy.context.evaluated_depsgraph_get())  # results hide it
     seen, original = [], refine.refine
 
     def watched(*given, **named):
+        found = original(*given, **named)
         seen.append((threading.current_thread() is threading.main_thread(), main_thread.window_draws()))
-        return original(*given, **named)
+        ui.values["meshes"] = named["given"].explicit.meshes.faces
+        return found
 
     refine.refine = watched
     ui.values["timer"] = bpy.app.timers.is_registered(main_thread.make_changes)
@@ -51,6 +58,7 @@ def steps(ui):
         yield from ui.until(lambda done=done: done and not bpy.app.is_job_running('RENDER'), 120, "the render")
         bpy.app.handlers.render_complete.remove(end)
         ui.values["locked" if locked else "unlocked"] = [*seen, render.render_errors()]
+    ui.values["disabled"] = *hiding.artists_flags(sheet), sheet.hide_get()
     ui.values["timers_at_end"] = bpy.app.timers.is_registered(main_thread.make_changes)
     addon_utils.disable(INSTALLED)  # and not in the preferences, which other tests share
     ui.values["timer_after"] = bpy.app.timers.is_registered(main_thread.make_changes)

@@ -20,3 +20,8 @@ def test_for_an_unlocked_one_the_main_thread_works_and_draws_nothing(seen: dict)
 
 def test_one_timer_lives_as_long_as_the_extension(seen: dict) -> None:
     assert (seen["timer"], seen["timers_at_end"], seen["timer_after"]) == (True, True, False)
+
+
+def test_meshes_that_are_disabled_in_viewports_render_with_their_modifiers(seen: dict) -> None:
+    assert seen["meshes"] == 4
+    assert seen["disabled"] == [False, True, False]

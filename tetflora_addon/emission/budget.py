@@ -90,10 +90,7 @@ class Detail:
 
 
 def fit_to_budget(
-    result: Refinement,
-    camera: Camera,
-    settings: RefinementSettings,
-    faces: float | None = None,
+    result: Refinement, camera: Camera, settings: RefinementSettings, faces: float | None = None
 ) -> Detail:
     """Detail that fits into the budget of the settings.
 
@@ -276,12 +273,7 @@ class Estimate:
 
 
 def estimate(
-    stand: Stand,
-    camera: Camera,
-    settings: RefinementSettings,
-    used: float,
-    allowed: float,
-    everything: bool = False,
+    stand: Stand, camera: Camera, settings: RefinementSettings, used: float, allowed: float, everything: bool = False
 ) -> Estimate:
     """Estimate a refinement.
 

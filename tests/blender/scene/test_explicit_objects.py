@@ -8,6 +8,7 @@ import bpy
 import numpy as np
 import pytest
 
+from tests.blender.assets.scatters import scattered
 from tests.blender.renders import picture
 from tests.blender.scenes import add_camera, add_mesh, add_plant, datablocks, depsgraph, select
 from tetflora_addon import errors
@@ -398,3 +399,44 @@ def test_the_operator_marks_and_unmarks():
     select(plant)
     with pytest.raises(RuntimeError, match="Select meshes, or objects that instance them, first"):
         bpy.ops.tetflora.mark(what='EXPLICIT')
+
+
+@pytest.mark.parametrize("fails", [False, True])
+def test_what_is_disabled_in_viewports_has_its_modifiers(fails):
+    """As renders show it; afterward it is disabled, and its eye as it was. Viewports do not show results either."""
+    scene = _scene()
+    sheet = add_mesh("sheet")
+    sheet.modifiers.new("array", 'ARRAY').count = 5
+    sheet.tetflora.is_explicit = sheet.hide_viewport = True
+    if fails:
+        sheet.matrix_world[0][3] = float("nan")
+        with pytest.raises(errors.SceneError):
+            _refine(scene)
+    else:
+        assert _refine(scene).polygons_full == 5
+        made = _made(scene)
+        assert made and all(o.hide_viewport and not o.hide_render for o in made)
+        refine.clear(scene)
+    assert (sheet.hide_viewport, sheet.hide_render, sheet.hide_get()) == (True, False, False)
+
+
+def test_plants_that_a_mesh_instances_render_where_it_is_disabled_in_viewports():
+    scene = _scene()
+    ground = scattered(add_plant("source", collection=bpy.data.collections.new("apart")), 4)
+    ground.tetflora.is_scatter = False
+    assert _refine(scene).plants == 4
+    refine.clear(scene)
+    ground.hide_viewport = True
+    assert _refine(scene).plants == 4
+    ground.hide_viewport = False
+    home = bpy.data.collections.new("home")
+    scene.collection.children.link(home)
+    scene.collection.objects.unlink(ground)
+    home.objects.link(ground)
+    home.hide_viewport = True
+    refine.clear(scene)
+    with pytest.raises(errors.SceneError, match='"ground": disabled in viewports, so its instances are unknown'):
+        _refine(scene)
+    home.hide_viewport = False
+    bpy.context.view_layer.layer_collection.children["home"].hide_viewport = True  # the eye
+    assert _refine(scene).plants == 4

@@ -74,6 +74,21 @@ def test_nothing_is_done_where_nothing_has_changed(scene, monkeypatch):
     assert results(scene) == [made]
 
 
+def test_it_comes_to_rest_where_a_mesh_is_disabled_in_viewports(scene, monkeypatch):
+    """To read it, it is enabled for a moment: nothing has changed thereby."""
+    sheet = add_mesh("sheet")
+    sheet.modifiers.new("array", 'ARRAY').count = 3
+    sheet.tetflora.is_explicit = sheet.hide_viewport = True
+    bpy.context.view_layer.update()
+    scene.tetflora.auto_refine = True
+    assert settle(monkeypatch) > 5
+    made = results(scene)[0]
+    changed(scene)
+    assert settle(monkeypatch) == 0
+    assert results(scene) == [made]
+    assert sheet.hide_viewport and not sheet.hide_get()
+
+
 @pytest.mark.parametrize("change", ["camera", "plant", "cutoff", "seed", "new", "form"])
 def test_what_changes_is_refined_again(scene, monkeypatch, change):
     scene.tetflora.auto_refine = True

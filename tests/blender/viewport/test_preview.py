@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from functools import partial
+from threading import Thread
 from types import SimpleNamespace
 
 import bpy
@@ -331,6 +332,24 @@ def test_simple_shapes_make_way_for_refined_plants_where_these_are_seen(monkeypa
     assert not is_drawn()
     bpy.context.view_layer.layer_collection.children["TetFlora"].hide_viewport = True  # the eye in the Outliner
     assert is_drawn()
+
+
+def test_the_thread_of_a_render_does_not_touch_the_context(monkeypatch):
+    """Blender crashes where it overrides that: a frame whose originals results hide, in the window."""
+    scene, _, plants = scene_of_plants(2)
+    scene.tetflora.preview.plants = 'LIGHT'
+    read_shapes(scene, depsgraph())
+    plants[0].hide_set(True)
+    told = SimpleNamespace(updates=[SimpleNamespace(id=scene)], view_layer=bpy.context.view_layer)
+    counted = []
+    monkeypatch.setattr(levels, "_visible", lambda layer: counted.append(layer) or 0)
+    monkeypatch.setattr(levels, "schedule", lambda: None)
+    thread = Thread(target=_on_update, args=(scene, told))
+    thread.start()
+    thread.join()
+    assert not counted
+    _on_update(scene, told)
+    assert counted
 
 
 @pytest.mark.parametrize("how", ["eye", "collection's eye", "monitor"])

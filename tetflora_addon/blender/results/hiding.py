@@ -14,12 +14,15 @@ scene remembers all of it in a custom property.
 import json
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from functools import partial
 
 import bpy
 
 from ...errors import SceneError
+from ..main_thread import in_main_thread
 from ..materials.nodes import MADE, is_ours, is_own, tag, untag
 from ..scene.motion import curves_of
+from ..scene.objects import may_take_part
 from . import output
 
 #: Custom properties of scenes: one entry for what is hidden.
@@ -428,11 +431,18 @@ def unpack_override_marks() -> None:
         del scene[OVERRIDES]
 
 
+def _not_evaluated(obj: bpy.types.Object) -> bool:
+    if not obj.hide_viewport or obj.hide_render or obj.type == 'EMPTY' or obj.library is not None or is_switched(obj):
+        return False
+    return may_take_part(obj) or obj.tetflora.is_occluder
+
+
 @contextmanager
 def originals_shown(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph | None = None) -> Iterator[None]:
     """Show objects that results of any scene hide as the artist left them, while the context lasts.
 
-    The dependency graph is updated if it is given, which only evaluated data requires.
+    The dependency graph is updated if it is given, which only evaluated data requires. What renders but is disabled in
+    viewports, which Blender evaluates nothing of, then has a closed eye instead.
     """
     linked = [(scene, purpose, linked_hidden(scene, purpose)) for scene, purpose in scenes_hiding()]
     for home, purpose, _ in linked:
@@ -442,11 +452,23 @@ def originals_shown(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph | Non
     for purpose, every in marked.items():
         for o in every:
             o.hide_render, o.hide_viewport = _marker(o, purpose)[0]
+    layer = getattr(depsgraph, "view_layer", None)
+    closed = {o: o.hide_get(view_layer=layer) for o in getattr(layer, "objects", ()) if _not_evaluated(o)}
+
+    def enable(on: bool) -> None:
+        for o, eye in closed.items():
+            o.hide_viewport = not on
+            o.hide_set(on or eye, view_layer=layer)
+
     try:
-        if (before or linked) and depsgraph is not None:
+        if closed:
+            in_main_thread(partial(enable, True))
+        if (before or linked or closed) and layer is not None:
             depsgraph.update()
         yield
     finally:
+        if closed:
+            in_main_thread(partial(enable, False))
         for o, flags in before.items():
             o.hide_render, o.hide_viewport = flags
         for home, purpose, every in reversed(linked):

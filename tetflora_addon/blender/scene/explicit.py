@@ -64,7 +64,7 @@ def read_explicit(depsgraph: bpy.types.Depsgraph) -> Explicit | None:
         look = looks.of(instance.object.original, owner if instance.is_instance else None, model=True)
         if reader.add(instance.object, np.array(instance.matrix_world, dtype=np.float64), look):
             found.add(owner)
-    # Objects whose eye is closed are listed nowhere; those that are disabled in viewports come without modifiers.
+    # Objects whose eye is closed are listed nowhere; what a collection disables in viewports comes without modifiers.
     for obj in sorted(marked - found, key=lambda o: o.name_full):
         unseen = obj.type in SURFACE_TYPES and not obj.visible_get(view_layer=depsgraph.view_layer)
         if unseen and reader.add(obj.evaluated_get(depsgraph), world_matrix(obj, depsgraph), looks.of(obj, model=True)):

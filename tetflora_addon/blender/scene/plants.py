@@ -122,14 +122,16 @@ class _Found:
     own: list[bpy.types.Object]  # plants and fields of the view layer
     copies: list[Copies]
 
-    def nothing(self, scene: bpy.types.Scene) -> SceneError:
+    def nothing(self, scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> SceneError:
         """The error where no plant is left."""
         if self.odd:
             return SceneError(_unknown(self.odd))
         found, own = self.own or self.copies, self.own
         off = found and not any(o.tetflora.enabled for o in (*own, *(c.owner for c in self.copies)))
         hidden = sum(o.tetflora.is_plant or o.tetflora.is_field for o in scene.objects) - len(own)
-        return NoPlantsError(_none_left(bool(off), [o.name for o in own if o.tetflora.is_field], hidden))
+        unknown = [o for o in renderable_objects(depsgraph.view_layer) if not o.evaluated_get(depsgraph).is_evaluated]
+        unknown = [o.name for o in unknown if may_instance(o) and o.instance_type != 'COLLECTION']
+        return NoPlantsError(_none_left(bool(off), unknown, [o.name for o in own if o.tetflora.is_field], hidden))
 
 
 def read_sources(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> list[Source]:
@@ -142,7 +144,7 @@ def read_sources(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> list
     """
     found = _find_plants(scene, depsgraph)
     if found.odd or not found.sources:
-        raise found.nothing(scene)
+        raise found.nothing(scene, depsgraph)
     return found.sources
 
 
@@ -153,7 +155,7 @@ def _read_plants(
     unknown = {species for _, species in found.odd}
     read = [some for source in found.sources if len((some := source.without(unknown)).part[1])]
     if not read:
-        raise found.nothing(scene)
+        raise found.nothing(scene, depsgraph)
     owners = [(source.part[0], len(source.part[1])) for source in read]
     owners[: len(found.single)] = [(obj.name, 1) for some in found.single.values() for obj in some]
     aged = classed(scene, [source.part for source in read])
@@ -282,9 +284,11 @@ def read_asset_plants(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) ->
     return found
 
 
-def _none_left(off: bool, fields: list[str], hidden: int) -> str:
+def _none_left(off: bool, unknown: list[str], fields: list[str], hidden: int) -> str:
     if off:
         return "All plants in the scene are disabled; enable some in the TetFlora tab of the sidebar"
+    if unknown:
+        return f"{listed(unknown)}: disabled in viewports, so its instances are unknown; close eyes in the Outliner"
     if fields:
         return f"{listed(fields)}: the field of plants has no points; add vertices, or populate a mesh"
     if hidden:
@@ -292,9 +296,7 @@ def _none_left(off: bool, fields: list[str], hidden: int) -> str:
             f"No plants to render; {hidden:,} are hidden in renders or excluded from the view layer. Enable them "
             "or their collections in the Outliner"
         )
-    return (
-        "No plants to render; add some with Add > TetFlora Plant, or with + under Layers in the sidebar's TetFlora tab"
-    )
+    return "No plants to render; add some with Add > TetFlora Plant, or with + under Layers in the TetFlora tab"
 
 
 def single_plants(plants: list[bpy.types.Object], depsgraph: bpy.types.Depsgraph) -> Seeds:

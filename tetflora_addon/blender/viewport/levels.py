@@ -131,7 +131,7 @@ def _shapes_of(
 
 
 def _visible(layer: bpy.types.ViewLayer) -> int:
-    """How many objects viewports show of a view layer: Blender counts them five times as fast as we ask each."""
+    """How many objects viewports show, which Blender counts fastest; in the main thread, or the override crashes it."""
     with bpy.context.temp_override(area=None, view_layer=layer):
         return len(bpy.context.visible_objects)
 
@@ -217,7 +217,7 @@ def _on_timer() -> float | None:
 
 
 def _on_update(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
-    if scene.tetflora.preview.plants == 'NONE':
+    if scene.tetflora.preview.plants == 'NONE' or not on_main_thread():  # what a render changes is not the artist's
         return
     preview = find(scene)
     for update in depsgraph.updates:
