@@ -144,6 +144,16 @@ def test_command_refine_saves_meshes(run: Run, seeds: Path, tmp_path: Path) -> N
     assert seeds.read_bytes() == before
 
 
+def test_command_export_writes_all_plants(run: Run, seeds: Path, tmp_path: Path) -> None:
+    target = tmp_path / "Wald 7 ü.glb"
+    done = run(
+        seeds, "--command", "tetflora", "export", target, "--variants", 1, "--polygons", 20_000, "--flat", "--json"
+    )
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert json.loads(done.stdout.strip().splitlines()[-1])["plants"] == PLANTS
+    assert target.read_bytes().startswith(b"glTF")
+
+
 def test_command_render_is_the_plain_render(run: Run, seeds: Path, animation: list[Path], tmp_path: Path) -> None:
     output = tmp_path / "still_##.png"
     done = run(seeds, "--command", "tetflora", "render", "--frame", 2, "--json", "--output", output)
