@@ -88,7 +88,7 @@ def test_the_untouched_startup_scene_is_used_and_its_cube_only_hidden():
 
 
 @pytest.mark.parametrize("touched", ["moved", "modeled", "renamed", "more"])
-def test_anything_else_keeps_its_scene(touched):
+def test_anything_else_is_no_startup_scene(touched):
     scene = _startup()
     cube = scene.objects["Cube"]
     if touched == "moved":
@@ -101,6 +101,12 @@ def test_anything_else_keeps_its_scene(touched):
         add_mesh("more")
     bpy.context.view_layer.update()
     assert not first_forest.is_startup(scene)
+
+
+def test_anything_else_keeps_its_scene():
+    scene = _startup()
+    scene.objects["Cube"].location.x = 1.0
+    bpy.context.view_layer.update()
     world = scene.world = bpy.data.worlds.new("mine")
     before, known = {o.name: (o.hide_render, o.hide_viewport) for o in scene.objects}, datablocks()
     bpy.ops.tetflora.first_forest()
