@@ -90,7 +90,7 @@ LTS_DESELECTED = scene/test_wind.py::test_a_picture_with_motion_blur_is_the_mean
 	$(addprefix results/test_baked_light.py::,test_baked_proxies_are_as_bright_as_lit_ones \
 	test_baked_pictures_have_next_to_no_noise)
 # EEVEE of 4.5 compiles each material for longer than all the rest takes. It draws one of each kind of proxy, baked
-# light, instances, and results beside what they stand for; nodes of bark and blades give there what they give in Cycles.
+# light, and instances; nodes of bark and blades give there what they give in Cycles.
 LTS_DESELECTED += materials/test_blade.py::test_the_mean_is_the_same_in_eevee \
 	materials/test_materials.py::test_bark_keeps_the_mean_color[ridged-EEVEE] \
 	results/test_cluster_meshes.py::test_clusters_of_a_mesh_look_like_it[BLENDER_EEVEE_NEXT]

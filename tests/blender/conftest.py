@@ -12,6 +12,16 @@ session.start()
 
 
 @pytest.fixture
+def coarsely_looked_at(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Levels of exported plants follow from views of few cells, for tests of files: their colors are none of it."""
+    from tetflora_addon.export import levels, opaque
+
+    monkeypatch.setattr(opaque, "_CELLS", 48)
+    monkeypatch.setattr(levels, "_FEWEST_CELLS", 40)
+    monkeypatch.setattr(levels, "_MOST_CELLS", 80)
+
+
+@pytest.fixture
 def keep_memory() -> Iterator[Callable[[float], None]]:
     """Sets the size of the frame cache in the preferences, in gigabytes, for one test."""
     from tetflora_addon.blender import preferences

@@ -14,7 +14,8 @@ from tetflora_addon.blender.scene import plants
 
 def test_forest_stands_as_it_is_described(clean_file, tmp_path, monkeypatch):
     monkeypatch.setattr(million, "_CLEAR", 25.0)  # what covers the summit takes longest
-    made = million.render_million(tmp_path / "forest.png", plants=600, width=64, samples=1)
+    monkeypatch.setattr(million, "_MEADOW", 52.0)
+    made = million.render_million(tmp_path / "forest.png", plants=200, width=32, samples=1)
     assert made["polygons"] + made["facets"] > 0
     assert (tmp_path / "forest.png").is_file()
     scene = bpy.context.scene
@@ -25,7 +26,7 @@ def test_forest_stands_as_it_is_described(clean_file, tmp_path, monkeypatch):
     ground, lake = scene.objects["Ground"], scene.objects["Lake"]
     below = np.array([ground.ray_cast((x, y, 1e4), (0, 0, -1))[1].z for x, y, _ in place.tolist()])
     forest = trees & (np.abs(place[:, 2] - below) < 0.1)
-    assert forest.sum() == 600
+    assert forest.sum() == 200
     assert place[:, 2].min() > lake.data.vertices[0].co.z
     assert place[forest & conifers, 2].mean() > place[forest & ~conifers, 2].mean() + 10.0
     eye, summit = scene.camera.location, scene.objects["Summit"].location

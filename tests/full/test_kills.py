@@ -120,8 +120,13 @@ def test_while_it_refines(victim: Callable[..., Path], moment: str) -> None:
     assert_sound(path.with_name("forest.blend1"))
 
 
-@pytest.mark.parametrize("moment", ["compressed", "plain"])
-@pytest.mark.parametrize(("times", "delay"), [(1, 0.0), (1, 0.003), (2, 0.006), (2, 0.012), (3, 0.025), (3, 0.05)])
+#: How often a file is saved, and seconds into the next save.
+SAVES = ((1, 0.0), (1, 0.003), (2, 0.006), (2, 0.012), (3, 0.025), (3, 0.05))
+#: Each of them of both forests, compressed of one and plain of the other; of each forest, half of them are.
+CASES = [(kept, ("compressed", "plain")[(n + kept) % 2], *one) for kept in (True, False) for n, one in enumerate(SAVES)]
+
+
+@pytest.mark.parametrize(("forest", "moment", "times", "delay"), CASES, indirect=["forest"])
 def test_while_it_saves(victim: Callable[..., Path], moment: str, times: int, delay: float) -> None:
     path = victim("save", moment, times, delay)
     for file in (path, path.with_name("forest.blend1")):

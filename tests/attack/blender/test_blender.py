@@ -16,7 +16,7 @@ session.start()
 from tests.attack import scene_cases  # noqa: E402
 from tests.attack.watch import attack  # noqa: E402
 
-CASES = 150
+CASES = 90
 
 
 @pytest.mark.parametrize("kind", scene_cases.SHARES)

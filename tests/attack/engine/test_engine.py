@@ -13,7 +13,7 @@ from tests.attack.watch import attack
 
 CASES = 2400
 #: Of kinds whose cases take longest.
-FEWER = {"species": 200, "polygons": 200, "cache": 600}
+FEWER = {"species": 120, "polygons": 120, "cache": 400}
 
 
 @pytest.mark.parametrize("kind", engine_cases.SHARES)

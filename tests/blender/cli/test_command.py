@@ -191,7 +191,7 @@ def test_help_is_no_error(arguments, capfd):
     assert "usage: blender FILE --command tetflora" in capfd.readouterr().out
 
 
-def test_export_writes_a_forest_and_tells_its_levels(forest, tmp_path, capfd):
+def test_export_writes_a_forest_and_tells_its_levels(forest, tmp_path, capfd, coarsely_looked_at):
     assert _run("export", tmp_path / "f.obj", "--variants", 1, "--polygons", 1000, "--flat", "--json") == 0
     figures = _figures(capfd)
     assert (figures["plants"], figures["variants"], figures["path"]) == (2, 1, str(tmp_path / "f.obj"))

@@ -24,7 +24,7 @@ from tetflora_addon.blender.scene.plants import read_plants
 from tetflora_addon.blender.worker import run_to_end
 from tetflora_addon.errors import TetFloraError
 
-pytestmark = pytest.mark.usefixtures("clean_file")
+pytestmark = pytest.mark.usefixtures("clean_file", "coarsely_looked_at")
 
 
 def scene():

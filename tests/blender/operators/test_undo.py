@@ -208,7 +208,7 @@ CASES: list[Case] = [
     ("update_layers of a stand", lambda: (stand(), change_stand()), "update_layers", {}),
     ("animate_growth", stand, "animate_growth", {}),
     ("keep_year", stand, "keep_year", {}),
-    ("add_biome", ground_active, "add_biome", {"biome": "hedgerow"}),
+    ("add_biome", ground_active, "add_biome", {"biome": "dead_forest"}),
     ("update_layers of a biome", lambda: (biome_added(), change_biome()), "update_layers", {}),
     ("remove_layer of a biome", biome_added, "remove_layer", {}),
     ("look", ground_active, "look", {}),

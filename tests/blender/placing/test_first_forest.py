@@ -42,7 +42,7 @@ def _startup():
     return bpy.context.scene
 
 
-def test_an_empty_scene_becomes_a_forest_that_can_be_refined():
+def test_an_empty_scene_becomes_a_forest():
     before = bpy.context.scene
     scene = _plant()
     assert scene == before
@@ -57,8 +57,6 @@ def test_an_empty_scene_becomes_a_forest_that_can_be_refined():
     assert scene.world is not None
     assert [o.type for o in scene.objects if o.type == 'LIGHT'] == ['LIGHT']
     assert {c.name for c in scene.collection.children} == {"First forest", "TetFlora plants"}
-    scene.render.resolution_x, scene.render.resolution_y = 80, 45
-    assert bpy.ops.tetflora.refine() == {'FINISHED'}
 
 
 def test_plants_stand_within_the_ground_that_is_seen():
@@ -90,7 +88,7 @@ def test_the_untouched_startup_scene_is_used_and_its_cube_only_hidden():
 
 
 @pytest.mark.parametrize("touched", ["moved", "modeled", "renamed", "more"])
-def test_anything_else_keeps_its_scene(touched):
+def test_anything_else_is_no_startup_scene(touched):
     scene = _startup()
     cube = scene.objects["Cube"]
     if touched == "moved":
@@ -101,6 +99,13 @@ def test_anything_else_keeps_its_scene(touched):
         cube.name = "House"
     else:
         add_mesh("more")
+    bpy.context.view_layer.update()
+    assert not first_forest.is_startup(scene)
+
+
+def test_anything_else_keeps_its_scene():
+    scene = _startup()
+    scene.objects["Cube"].location.x = 1.0
     bpy.context.view_layer.update()
     world = scene.world = bpy.data.worlds.new("mine")
     before, known = {o.name: (o.hide_render, o.hide_viewport) for o in scene.objects}, datablocks()
@@ -179,7 +184,7 @@ def test_the_tab_says_what_comes_next_and_stops_when_it_is_done():
     scene = bpy.context.scene
     assert hint(scene) == "F12 renders, Refine shows it here"
     scene.render.resolution_percentage = 5
-    bpy.ops.tetflora.refine()
+    assert bpy.ops.tetflora.refine() == {'FINISHED'}
     assert hint(scene) == ""
     bpy.ops.tetflora.keep_results()
     assert not scene.tetflora.refine_at_render

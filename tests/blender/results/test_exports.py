@@ -25,6 +25,14 @@ from tetflora_addon.blender.job import refine
 
 FORMATS = ("usdc", "abc", "obj", "glb")
 FORMS = ('MICROSURFACES', 'SHELLS')
+#: Formats that a collection is exported in by its name, and what an exporter's option for the selection is called.
+COLLECTIONS = ("usdc", "obj", "glb")
+SELECTIONS = {
+    "usdc": "selected_objects_only",
+    "abc": "selected",
+    "obj": "export_selected_objects",
+    "glb": "use_selection",
+}
 
 
 @dataclass
@@ -143,15 +151,64 @@ def measure(obj) -> Surface:
     )
 
 
+@dataclass
+class Exported:
+    """A refined scene that was written in each format.
+
+    points : how many microspheres it has
+    colors : of materials in the viewport, by their names
+    """
+
+    folder: Path
+    surfaces: dict[str, Surface]
+    parents: dict[str, str]
+    points: int
+    colors: dict[str, tuple[float, ...]]
+
+
 @pytest.fixture(scope="module", params=FORMS)
-def exported(blender, request, tmp_path_factory) -> tuple[Path, dict[str, Surface], dict[str, str]]:
-    """A folder with one result in each format; its surfaces, and the parents of its objects."""
+def exported(blender, request, tmp_path_factory) -> Exported:
+    """One result in each format, and what it was in Blender."""
     folder = tmp_path_factory.mktemp(request.param)
     refined(request.param)
     for suffix in FORMATS:
         if not is_absent(suffix):
             export(folder / f"forest.{suffix}")
-    return folder, surfaces(), parents()
+    clouds = [o for o in bpy.context.scene.objects if o.get("tetflora_kind") == "proxy"]
+    points = sum(len(o.data.points if o.type == 'POINTCLOUD' else o.data.vertices) for o in clouds)
+    return Exported(folder, surfaces(), parents(), points, viewport_colors())
+
+
+def viewport_colors() -> dict[str, tuple[float, ...]]:
+    return {plain(m.name): tuple(m.diffuse_color)[:3] for m in bpy.data.materials}
+
+
+@pytest.fixture(scope="module")
+def alone(blender, tmp_path_factory) -> tuple[Path, dict[str, Surface]]:
+    """A folder with results of a scene that has a mesh of the artist's as well, without it, and what they were.
+
+    As the collection that they lie in, and as a selection once they are kept: before, none of them can be selected.
+    """
+    folder = tmp_path_factory.mktemp("alone")
+    refined('MICROSURFACES')
+    expected = surfaces()
+    ground = bpy.data.objects.new("ground", bpy.data.meshes.new("ground"))
+    ground.data.from_pydata([(0, 0, 0), (1, 0, 0), (0, 1, 0)], [], [(0, 1, 2)])
+    bpy.context.scene.collection.objects.link(ground)
+    for suffix in COLLECTIONS:
+        if not is_absent(suffix):
+            export(folder / f"collection.{suffix}", collection="TetFlora")
+    bpy.ops.object.select_all(action='SELECT')
+    assert ground.select_get()
+    assert not any(o.select_get() for o in bpy.data.collections["TetFlora"].objects)
+    assert bpy.ops.tetflora.keep_results() == {'FINISHED'}
+    bpy.ops.object.select_all(action='DESELECT')
+    for obj in bpy.data.collections["TetFlora kept"].objects:
+        obj.select_set(True)
+    for suffix, option in SELECTIONS.items():
+        if not is_absent(suffix):
+            export(folder / f"selected.{suffix}", **{option: True})
+    return folder, expected
 
 
 def parents() -> dict[str, str]:
@@ -160,12 +217,12 @@ def parents() -> dict[str, str]:
 
 @pytest.mark.parametrize("suffix", FORMATS)
 def test_what_was_refined_comes_back(exported, suffix):
-    folder, expected, families = exported
+    expected, families = exported.surfaces, exported.parents
     assert {name.split("_")[-2] for name in expected} == {"bark", "leaf", "proxies"}
     assert set(families.values()) == {"Bush__TetFlora_", "Conifer__TetFlora_"}
     if is_absent(suffix):
         return
-    read_back(folder / f"forest.{suffix}")
+    read_back(exported.folder / f"forest.{suffix}")
     found = surfaces()
     assert set(found) == set(expected)
     # OBJ knows no parents; USD has one more where materials are kept.
@@ -186,89 +243,58 @@ def test_what_was_refined_comes_back(exported, suffix):
             np.testing.assert_allclose(np.sort(after.uv, 0)[[0, -1]], np.sort(before.uv, 0)[[0, -1]], atol=1e-5)
 
 
-def test_usd_holds_the_color_of_each_leaf(blender, tmp_path):
+@pytest.mark.parametrize("exported", ['MICROSURFACES'], indirect=True)
+def test_usd_holds_the_color_of_each_leaf(exported):
     if is_absent("usdc"):
         return
-    refined('MICROSURFACES')
-    expected = surfaces()
-    export(tmp_path / "forest.usdc")
-    read_back(tmp_path / "forest.usdc")
+    read_back(exported.folder / "forest.usdc")
     for name, after in surfaces().items():
-        before = expected[name].attributes
+        before = exported.surfaces[name].attributes
         assert {"tf_color", "tf_transmission"} <= set(before)
         for key, values in before.items():
             np.testing.assert_array_equal(after.attributes[key], values, err_msg=f"{name} {key}")
 
 
-def test_obj_holds_the_viewport_color_of_each_material(blender, tmp_path):
-    refined('MICROSURFACES')
-    colors = {plain(m.name): tuple(m.diffuse_color)[:3] for m in bpy.data.materials}
-    export(tmp_path / "forest.obj")
-    read_back(tmp_path / "forest.obj")
-    read = {plain(m.name): tuple(m.diffuse_color)[:3] for m in bpy.data.materials}
+@pytest.mark.parametrize("exported", ['MICROSURFACES'], indirect=True)
+def test_obj_holds_the_viewport_color_of_each_material(exported):
+    read_back(exported.folder / "forest.obj")
+    read = viewport_colors()
     assert read
     for name, color in read.items():
-        assert color == pytest.approx(colors[name], abs=1e-3), name
+        assert color == pytest.approx(exported.colors[name], abs=1e-3), name
 
 
+@pytest.mark.parametrize("exported", ['MICROSPHERES'], indirect=True)
 @pytest.mark.parametrize("suffix", FORMATS)
-def test_microspheres_come_back_from_usd_alone(blender, tmp_path, suffix):
+def test_microspheres_come_back_from_usd_alone(exported, suffix):
     if is_absent(suffix):
         return
-    refined('MICROSPHERES')
-    clouds = [o for o in bpy.context.scene.objects if o.get("tetflora_kind") == "proxy"]
-    points = sum(len(o.data.points if o.type == 'POINTCLOUD' else o.data.vertices) for o in clouds)
-    assert points > 100
-    expected = surfaces()
-    export(tmp_path / f"forest.{suffix}")
-    read_back(tmp_path / f"forest.{suffix}")
+    assert exported.points > 100
+    read_back(exported.folder / f"forest.{suffix}")
     read = [o for o in bpy.context.scene.objects if o.type in {'POINTCLOUD', 'MESH'} and "proxies" in o.name]
     found = sum(len(o.data.points if o.type == 'POINTCLOUD' else o.data.vertices) for o in read)
     by_usd = suffix == "usdc" and compat.can_resize_point_clouds()
-    assert found == (points if by_usd else 0)
-    assert set(surfaces()) == set(expected)  # the rest is there all the same
+    assert found == (exported.points if by_usd else 0)
+    assert set(surfaces()) == set(exported.surfaces)  # the rest is there all the same
     if by_usd:
         assert all({"radius", "tf_color", "tf_transmission"} <= set(o.data.attributes.keys()) for o in read)
 
 
 @pytest.mark.parametrize("suffix", FORMATS)
-def test_results_are_exported_by_themselves(blender, tmp_path, suffix):
-    """Nothing but results: as a selection once they are kept, since before nothing of them can be selected."""
+def test_results_are_exported_by_themselves(alone, suffix):
+    """As a selection: nothing but results."""
     if is_absent(suffix):
         return
-    refined('MICROSURFACES')
-    expected = surfaces()
-    ground = bpy.data.objects.new("ground", bpy.data.meshes.new("ground"))
-    ground.data.from_pydata([(0, 0, 0), (1, 0, 0), (0, 1, 0)], [], [(0, 1, 2)])
-    bpy.context.scene.collection.objects.link(ground)
-    bpy.ops.object.select_all(action='SELECT')
-    assert ground.select_get()
-    assert not any(o.select_get() for o in bpy.data.collections["TetFlora"].objects)
-    assert bpy.ops.tetflora.keep_results() == {'FINISHED'}
-    bpy.ops.object.select_all(action='DESELECT')
-    for obj in bpy.data.collections["TetFlora kept"].objects:
-        obj.select_set(True)
-    option = {
-        "usdc": "selected_objects_only",
-        "abc": "selected",
-        "obj": "export_selected_objects",
-        "glb": "use_selection",
-    }[suffix]
-    export(tmp_path / f"selected.{suffix}", **{option: True})
-    read_back(tmp_path / f"selected.{suffix}")
+    folder, expected = alone
+    read_back(folder / f"selected.{suffix}")
     assert set(surfaces()) == set(expected)
 
 
-@pytest.mark.parametrize(("suffix", "option"), [("usdc", "collection"), ("obj", "collection"), ("glb", "collection")])
-def test_the_collection_is_exported_by_name(blender, tmp_path, suffix, option):
-    """The exporters of a collection's own panel, which nothing has to be selected for."""
+@pytest.mark.parametrize("suffix", COLLECTIONS)
+def test_the_collection_is_exported_by_name(alone, suffix):
+    """By the exporters of a collection's own panel, which nothing has to be selected for."""
     if is_absent(suffix):
         return
-    refined('MICROSURFACES')
-    expected = surfaces()
-    ground = bpy.data.objects.new("ground", bpy.data.meshes.new("ground"))
-    ground.data.from_pydata([(0, 0, 0), (1, 0, 0), (0, 1, 0)], [], [(0, 1, 2)])
-    bpy.context.scene.collection.objects.link(ground)
-    export(tmp_path / f"collection.{suffix}", **{option: "TetFlora"})
-    read_back(tmp_path / f"collection.{suffix}")
+    folder, expected = alone
+    read_back(folder / f"collection.{suffix}")
     assert set(surfaces()) == set(expected)

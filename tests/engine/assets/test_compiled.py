@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from tests.engine.assets import trees
-from tetflora_addon.assets.asset import MESH_FACES, Asset, AssetSource
+from tetflora_addon.assets.asset import COUNTS, MESH_FACES, Asset, AssetSource
 from tetflora_addon.assets.measures import through_both_sides
 from tetflora_addon.errors import TetFloraError
 
@@ -58,6 +58,8 @@ def check(source: AssetSource, asset: Asset) -> None:
     assert clusters.moment[filled, :3].sum(axis=1) == pytest.approx(1.0, abs=1e-6)
     assert (clusters.width[filled] > 0).all()
     assert (clusters.width >= 0).all() and (clusters.one_leaf >= 0).all()
+    assert clusters.weights.shape == (len(clusters), len(COUNTS))
+    assert ((clusters.weights >= 0.1) & (clusters.weights <= 1.0)).all()
     # Means of parents are those of children, by optical area.
     for name in ("color", "transmission", "moment", "width"):
         value = getattr(clusters, name).reshape(len(clusters), -1) * clusters.optical_area[:, None]
@@ -108,7 +110,6 @@ def test_any_mesh_compiles_or_is_named(seed: int, vertices: int, faces: int) -> 
         return
     check(source, asset)
     check_samples(asset)
-    assert ((asset.clusters.weights >= 0.1) & (asset.clusters.weights <= 1.0)).all()
 
 
 @pytest.mark.parametrize("kind", KINDS)

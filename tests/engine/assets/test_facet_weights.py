@@ -11,14 +11,6 @@ import pytest
 
 from tests.engine.assets import trees
 from tetflora_addon.assets import compiled
-from tetflora_addon.assets.asset import COUNTS
-
-
-@pytest.mark.parametrize("kind", sorted(trees.SOURCES))
-def test_weights_are_fractions(kind: str) -> None:
-    weights = trees.compiled(kind).clusters.weights
-    assert weights.shape[1] == len(COUNTS)
-    assert ((weights >= 0.1) & (weights <= 1.0)).all()
 
 
 def test_a_single_sheet_needs_all_of_its_area() -> None:

@@ -219,6 +219,7 @@ def test_sizes_are_measured_and_fitted_as_plants_grow(kind: str) -> None:
     assert_allclose(height, real[0], rtol=0.08)
     assert_allclose(width, real[1], rtol=0.16)
     assert_allclose(np.mean(width / real[1]), 1.0, rtol=0.05)
+    assert_allclose(measured(flora, seeds.take(np.array([3]))), [height[3:4], width[3:4]], rtol=1e-12)  # alone
     wanted = height * rng.uniform(0.9, 1.1, n), width * rng.uniform(0.8, 1.2, n)
     factors = fitted(flora, seeds, *wanted)
     crown = seeds.crown.copy()

@@ -303,7 +303,7 @@ def test_a_tile_that_needs_more_than_it_has_is_evenly_coarser(times: float) -> N
     flora, _, camera, result = wood()
     blocks, facets, _ = drawn_wood()
     most = (sum(block.buffers.polygons for block in blocks) + len(facets)) / times
-    pictures = [support.drawn(flora, result, camera, 1.2, 0.6, most=limit) for limit in (np.inf, most)]
+    pictures = drawn_wood(), support.drawn(flora, result, camera, 1.2, 0.6, most=most)
     whole, limited = (np.isfinite(coverage_of(*picture, camera).depth).mean() for picture in pictures)
     assert limited == pytest.approx(whole, rel=0.01)
     _, facets, seen = pictures[1]
@@ -460,3 +460,20 @@ def test_shadows_from_just_beside_the_image_are_fine() -> None:
     _, facets, _ = support.drawn(flora, replace(run(flora, seeds, camera)[1], lights=(lit,)), camera, 1.2, 0.6)
     near = facets.take(np.flatnonzero(np.hypot(facets.center[:, 0] + 16.5, facets.center[:, 1]) < 1.5))
     assert np.average(near.side, weights=near.side**2) < 0.2
+
+
+def test_what_throws_shadows_into_the_image_is_opened_and_nothing_is_there_twice() -> None:
+    flora, seeds = (
+        support.alone("birch", BIRCH),
+        support.plants(np.arange(3), position=[(-16, 0, 0), (-19, 6, 0), (60, 0, 0)]),
+    )
+    camera = support.camera((0, -30, 8), (0, 0, 8), pixels=WIDTH, view=0.7)
+    lit = Light("SUN", np.zeros(3), np.array([0.8, 0.1, -0.6]), 0.01)
+    given = support.refined(flora, replace(run(flora, seeds, camera)[1], lights=(lit,)), camera, 1.2, 0.6).drawing
+    tile, kind = subject._Tile(given, None), given.kinds[0]
+    fine, left = tile._for_shadows(kind, tile.frontier.pool(kind, given.parts[0]))
+    assert len(fine) > 100 and len(left)
+    every = PlantParts.concatenate([fine.parts, left.parts])
+    assert len(np.unique(every.branches.key + every.branch_only.astype(np.uint64))) == len(every)
+    whole = subplant_totals(flora, trunks(flora.rows, seeds)).optical_area.sum()
+    assert every.totals.optical_area.sum() == pytest.approx(whole, rel=0.05)  # plants differ in leaves

@@ -192,6 +192,13 @@ def test_branches_take_time_where_leaves_take_little():
     assert winter.seconds > 0.8 * summer.seconds
 
 
+def test_with_fewer_leaves_there_is_as_much_wood():
+    parts = crown_of(load_species("birch")).parts
+    some, wood = parts.with_leaves(0.25), parts.form < 0
+    assert wood.any() and not wood.all()
+    np.testing.assert_array_equal(some.number, np.where(wood, parts.number, 0.25 * parts.number))
+
+
 def test_limits_hold():
     free = _estimate(_stand())
     assert not free.limited

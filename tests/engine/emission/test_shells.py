@@ -48,6 +48,7 @@ def test_edges_belong_to_their_corners():
     np.testing.assert_array_equal(np.sort(buffers.edge_verts[buffers.corner_edges], axis=1), wanted)
     assert len(np.unique(buffers.edge_verts, axis=0)) == 18
     assert np.bincount(buffers.corner_edges).tolist() == [2] * 18
+    assert not buffers.smooth  # the shader takes their normals for those of the cell's sides
 
 
 @settings(deadline=None, max_examples=25)

@@ -303,8 +303,9 @@ def test_facets_move_with_what_bears_them(kind: str) -> None:
         assert low.velocity is None
         way = (high.center - low.center) / (2 * step)
         error = np.linalg.norm(now.velocity - way, axis=1)
-        # Leaves turn to the light as well while their branches turn, by little.
-        assert np.median(error) < 0.03 * np.linalg.norm(way, axis=1).max()
+        # Leaves turn to the light as well while their branches turn, by little; many are facets of wood.
+        for some in (now.transmission > 0.0, now.transmission == 0.0):
+            assert not some.any() or np.median(error[some]) < 0.03 * np.linalg.norm(way, axis=1).max()
         assert np.linalg.norm(now.velocity, axis=1).max() > 0.01
         mesh = facet_mesh(now)
         np.testing.assert_array_equal(mesh.attributes["velocity"][1][::3], now.velocity.astype(np.float32))

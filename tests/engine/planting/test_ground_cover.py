@@ -60,8 +60,11 @@ def _floor(canopy: Canopy, kinds: int = 2) -> Floor:
     return run_to_end(mapping(SHEET, canopy, kinds))
 
 
-def test_light_in_the_middle_under_one_crown_is_that_of_beer_and_lambert():
-    radius, base, top, area = 3.0, 3.0, 11.0, 90.0
+@pytest.mark.parametrize(
+    ("radius", "base", "top", "area"), [(3.0, 3.0, 11.0, 90.0), (9.0, 1.0, 5.0, 400.0)], ids=["slender", "broad"]
+)
+def test_light_in_the_middle_under_one_crown_is_that_of_beer_and_lambert(radius, base, top, area):
+    """Rays from aside cross most of a broad crown, and little of a slender one."""
     half, height = (top - base) / 2, (top + base) / 2
     light = run_to_end(light_on(SHEET, _canopy([SIDE / 2, SIDE / 2], radius, base, top, area)))
     thick = FACING * CLUSTERED * area / (4 / 3 * np.pi * radius**2 * half)

@@ -385,7 +385,7 @@ def test_nothing_is_wrong_where_distances_thin_what_a_density_draws():
     assert (0.5 * placed.wanted < len(placed) < placed.wanted, placed.reason) == (True, "")
 
 
-@pytest.mark.parametrize("many", [dict(count=20), dict(by_density=True, density=0.2)])
+@pytest.mark.parametrize("many", [dict(count=20), *(dict(by_density=True, density=plants / 100) for plants in (1, 20))])
 def test_what_fills_the_ground_already_is_named(many):
     full = place(Terrain(SQUARE), Rules(count=1000, min_distance=0.5))
     placed = place(Terrain(SQUARE), Rules(min_distance=2.0, **many), older=full.position)

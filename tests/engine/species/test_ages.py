@@ -41,6 +41,13 @@ def test_at_the_full_age_it_is_the_species_itself(name: str) -> None:
     assert with_age(species, ages_of(species).full) is species
 
 
+@pytest.mark.parametrize("name", [name for name in support.SPECIES if load_species(name).spur is not None])
+def test_just_before_the_full_age_short_shoots_are_as_many(name: str) -> None:
+    species = load_species(name)
+    before = expected_members(with_age(species, 0.999 * ages_of(species).full))
+    assert before.spurs == pytest.approx(expected_members(species).spurs, rel=0.01)
+
+
 @pytest.mark.parametrize("name", support.SPECIES)
 def test_every_species_has_every_age(name: str) -> None:
     """Nothing is infinite or negative, and what does not die has leaves or wood."""

@@ -18,14 +18,16 @@ SIDE = 600.0
 RADIUS = 3.0
 
 
-def fallen(dispersal: float, radius: float = RADIUS, age: float = 500.0) -> tuple[SeedDispersal, NDArray[np.float64]]:
-    """Seeds on a square meter (rows, columns) around one beech in the middle of the ground."""
+def fallen(
+    dispersal: float, radius: float = RADIUS, age: float = 500.0, east: float = 0.5, north: float = 0.5
+) -> tuple[SeedDispersal, NDArray[np.float64]]:
+    """Seeds on a square meter (rows, columns) around one beech at fractions of the ground, by itself in the middle."""
     beech = load_species("beech")
     traits = StandTraits([StandSpecies(beech, ecology=replace(StandSpecies(beech).needs, dispersal=dispersal))])
     site, suitability = StandSite(0.0, 0.0, SIDE / 120, np.zeros((120, 120))), np.ones((1, 120**2))
     plants: Plants = planted(site, traits, suitability, 1.0, 0).take(np.array([0]))
     one = replace(
-        plants, x=np.array([SIDE / 2]), y=np.array([SIDE / 2]), radius=np.array([radius]), age=np.array([age])
+        plants, x=np.array([SIDE * east]), y=np.array([SIDE * north]), radius=np.array([radius]), age=np.array([age])
     )
     rain = SeedDispersal(site, traits, suitability, 300.0, 0.0)
     return rain, rain.fallen(one).reshape(rain.rows, rain.columns)
@@ -46,6 +48,14 @@ def test_seeds_travel_as_far_as_the_species_says(dispersal: float) -> None:
     middle = (np.arange(len(seeds)) + 0.5) * (SIDE / len(seeds)) - SIDE / 2
     away = np.hypot(*np.meshgrid(middle, middle))
     assert (seeds * away).sum() / seeds.sum() == pytest.approx(dispersal, rel=0.15)
+
+
+@pytest.mark.parametrize("east", [0.0, 0.999, 1.0])
+@pytest.mark.parametrize("north", [0.0, 0.999, 1.0])
+def test_plants_at_the_border_bear_there(east: float, north: float) -> None:
+    rain, seeds = fallen(1.0, east=east, north=north)
+    place = np.unravel_index(np.argmax(seeds), seeds.shape)
+    assert place == ((rain.rows - 1) * round(north), (rain.columns - 1) * round(east))
 
 
 def test_seeds_go_to_all_sides_alike_and_fewer_the_farther() -> None:
