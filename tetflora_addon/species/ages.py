@@ -247,7 +247,8 @@ class _Aged:
         # have more branches on a meter than will stay, where limbs alone do not bear so much, and fewer leaves where
         # these bear more.
         leaves = self.ages.diameters(self.years) ** self.ages.leaves * self.leafless
-        wanted = expected_leaf_area(self.one) * leaves * min(self.height / _SMALL, 1.0)
+        closed = max(self.height / _SMALL, self.ages.heights(self.years))  # low shrubs' crowns at their full height
+        wanted = expected_leaf_area(self.one) * leaves * min(closed, 1.0)
         self.thin = min(wanted / max(expected_leaf_area(out), 1e-9), _FULLER)
         if self.thin < 1 or self.now[self.stem] >= 1:
             return self._made()

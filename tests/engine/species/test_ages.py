@@ -18,7 +18,7 @@ from tetflora_addon.errors import SpeciesError
 from tetflora_addon.growth.rows import DEAD_ORDER
 from tetflora_addon.species.ages import STAGES, ages_of, stage, with_age
 from tetflora_addon.species.catalog import load_species, species_from_dict
-from tetflora_addon.species.members import expected_members, expected_polygons
+from tetflora_addon.species.members import expected_leaf_area, expected_members, expected_polygons
 from tetflora_addon.species.species import grown
 
 TREES = [name for name in support.SPECIES if not ages_of(load_species(name)).scaled]
@@ -46,6 +46,14 @@ def test_just_before_the_full_age_short_shoots_are_as_many(name: str) -> None:
     species = load_species(name)
     before = expected_members(with_age(species, 0.999 * ages_of(species).full))
     assert before.spurs == pytest.approx(expected_members(species).spurs, rel=0.01)
+
+
+@pytest.mark.parametrize("name", [name for name in TREES if expected_leaf_area(load_species(name)) > 0])
+def test_around_the_full_age_leaves_are_as_many(name: str) -> None:
+    """Low shrubs as well, whose crowns are full before they are as high as a sapling."""
+    species = load_species(name)
+    around = [expected_leaf_area(with_age(species, times * ages_of(species).full)) for times in (0.999, 1.001)]
+    assert around == pytest.approx([expected_leaf_area(species)] * 2, rel=0.02)
 
 
 @pytest.mark.parametrize("name", support.SPECIES)
