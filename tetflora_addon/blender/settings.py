@@ -248,11 +248,7 @@ class RefinementProperties(settings_in(RefinementSettings)):
     quality: choice(
         "Quality",
         "How fine the result is: Cutoff, and the sizes of leaves and facets that go with it",
-        (
-            *QUALITY_ITEMS,
-            ('CUSTOM', "Custom", "Your own values"),
-            ('EVERYTHING', "Every Polygon", EVERYTHING),
-        ),
+        (*QUALITY_ITEMS, ('CUSTOM', "Custom", "Your own values"), ('EVERYTHING', "Every Polygon", EVERYTHING)),
         get=quality_number,
         set=set_quality,
     )

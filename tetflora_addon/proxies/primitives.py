@@ -120,11 +120,7 @@ def triangle_mesh(triangles: Triangles) -> MeshBuffers:
         corner_verts=every.ravel(),
         corner_edges=every.ravel().copy(),
         face_offsets=np.arange(n + 1, dtype=np.int32) * np.int32(3),
-        attributes={
-            "tf_color": ("FACE", triangles.color),
-            "tf_transmission": ("FACE", triangles.transmission),
-            **more,
-        },
+        attributes={"tf_color": ("FACE", triangles.color), "tf_transmission": ("FACE", triangles.transmission), **more},
     )
 
 

@@ -78,11 +78,7 @@ def kinds_of(data: JobData, seeds: Seeds, most: int) -> Job[list[PlantKind]]:
 
 
 def variants_of(
-    seeds: Seeds,
-    kinds: Sequence[PlantKind],
-    number_of_levels: int,
-    most_polygons: int,
-    left: float = np.inf,
+    seeds: Seeds, kinds: Sequence[PlantKind], number_of_levels: int, most_polygons: int, left: float = np.inf
 ) -> Job[Shown]:
     """Choose variants of all kinds, and make these.
 

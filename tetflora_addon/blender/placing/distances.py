@@ -23,10 +23,7 @@ HECTARE = 10_000.0
 #: Square meters of the area that densities of the brush are counted on.
 SQUARE = 100.0
 #: Whence the distance comes, as stored.
-SOURCES = (
-    ('SPECIES', "Species", "From the crowns of the species", 0),
-    ('OWN', "Own", "Set by the artist", 1),
-)
+SOURCES = (('SPECIES', "Species", "From the crowns of the species", 0), ('OWN', "Own", "Set by the artist", 1))
 
 
 def weights_of(population: bpy.types.PropertyGroup) -> dict[str, float]:
