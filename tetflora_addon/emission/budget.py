@@ -41,7 +41,7 @@ from ..refinement.settings import RefinementSettings
 from ..subplants.pieces import expand
 from ..subplants.rings import BUD_RINGS, bud_sides, finer, round_up_to
 from ..subplants.tubes import tube_faces
-from .drawing import HIDDEN, HIDDEN_A_PIXEL, HIDDEN_LEAVES, LIT_LEAVES, NEVER_TOO_MANY, OUTSIDE_A_PIXEL, SHADOW
+from .drawing import HIDDEN, HIDDEN_A_PIXEL, HIDDEN_LEAVES, LIT_LEAVES, NEVER_TOO_MANY, OUTSIDE_A_PIXEL, SHADOW, TILE
 from .frontier import DETAIL
 from .plants import BENT, BROAD, NEARER, SIDES, TOLERANCE, TUBES, TWIG, LeafDetail, kite_widths
 
@@ -90,10 +90,7 @@ class Detail:
 
 
 def fit_to_budget(
-    result: Refinement,
-    camera: Camera,
-    settings: RefinementSettings,
-    faces: float | None = None,
+    result: Refinement, camera: Camera, settings: RefinementSettings, faces: float | None = None
 ) -> Detail:
     """Detail that fits into the budget of the settings.
 
@@ -180,8 +177,8 @@ SECONDS_PER_PIXEL = 2.7e-5
 SECONDS_PER_BRANCH = np.array([3.3e-6, 2.4e-5])
 #: Seconds of each polygon, and of each triangle of those that are expanded.
 SECONDS_EXPANDED = np.array([5e-7, 1.2e-7])
-#: Bytes of each plant.
-BYTES_PER_PLANT = 500.0
+#: Bytes of each plant, of each process that draws, and of each polygon or facet of the tile that it draws.
+BYTES_PER_PLANT, BYTES_PER_PROCESS, BYTES_IN_TILE = 500.0, 130e6, 350.0
 #: Leaves and branches that are looked at, about, how many of them lie in a cell of the image, and how many of a plant
 #: in view for one of a plant that is not.
 _PARTS, _IN_CELL, _IN_VIEW = 4096, 32, 16.0
@@ -282,6 +279,7 @@ def estimate(
     used: float,
     allowed: float,
     everything: bool = False,
+    processes: int = 0,
 ) -> Estimate:
     """Estimate a refinement.
 
@@ -296,12 +294,15 @@ def estimate(
         Bytes left for results, see `memory.allowance`; infinite without a limit.
     everything : bool
         Whether plants are expanded instead of refined; limits do not hold then.
+    processes : int
+        That draw tiles beside Blender; 0 where it does so itself.
     """
     parts, plant = stand.parts(camera)
     extent = camera.extent_around(parts.position)
     whole = _polygons(stand.crowns, parts, stand.which[plant], camera, extent)
     plants = round(stand.number.sum())
     seconds, memory = SECONDS + SECONDS_PER_PLANT * plants, used + BYTES_PER_PLANT * plants
+    memory += BYTES_PER_PROCESS * processes
     if everything:
         made = whole @ parts.number
         memory += BYTES_PER_TRIANGLE * float(made[1])
@@ -310,7 +311,8 @@ def estimate(
     made = min(wanted, settings.max_polygons or np.inf, allowed / BYTES_PER_POLYGON)
     opened = float(SECONDS_PER_BRANCH @ branches) * made / max(wanted, 1.0)
     seconds += SECONDS_PER_PIXEL * covered + opened + float(SECONDS_EXPANDED[0]) * made
-    memory += BYTES_PER_POLYGON * made
+    busy = min(max(processes, 1) / max(camera.width // TILE, 1), 1.0)
+    memory += (BYTES_PER_POLYGON + busy * BYTES_IN_TILE) * made
     return Estimate(plants, made, seconds, memory, wanted > made)
 
 

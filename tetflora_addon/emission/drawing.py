@@ -189,9 +189,7 @@ def drawn_blocks(given: Drawing) -> Iterator[Block | Parts | Shown]:
             yield replace(one, fraction=(number + 1) / whole) if isinstance(one, Block) else one
 
 
-def _tiles(
-    given: Drawing,
-) -> tuple[list[tuple[tuple[int, int], list[Arrays], float]], list[Arrays], list[Shown]]:
+def _tiles(given: Drawing) -> tuple[list[tuple[tuple[int, int], list[Arrays], float]], list[Arrays], list[Shown]]:
     """Columns, parts and share of all that may be drawn for each tile, parts out of view, and what is shown already.
 
     A part belongs to the tile that its middle is in; what is wider than half a tile is opened first.
