@@ -71,8 +71,9 @@ def changed_and_undone(ui, space):
     ui.move(*ui.center())
     look(space, 70.0, 60.0)
     yield from ui.until(lambda: bool(auto.message()), 30, "it begins anew")
+    due = auto._state.due
     ui.press('NUMPAD_4')
-    yield 0.5
+    yield from ui.until(lambda: auto._state.due > due, 30, "it waits until the view is quiet")
     ui.values["turned"] = auto.message()
     bpy.data.objects["plant 0"].location.x += 500.0
     bpy.ops.ed.undo_push(message="moved")
