@@ -119,10 +119,9 @@ class TETFLORA_OT_first_forest(Reporting, bpy.types.Operator):
             ground.select_set(True, view_layer=layer)
             layer.objects.active = ground
         plants = sum(o.tetflora.is_plant for o in scene.objects)
-        screen = context.screen
-        for area in screen.areas if screen and not bpy.app.background else ():
-            if area.type == 'VIEW_3D':
-                area.spaces.active.region_3d.view_perspective = 'CAMERA'
+        areas = context.screen.areas if context.screen and not bpy.app.background else ()
+        for area in (area for area in areas if area.type == 'VIEW_3D'):
+            area.spaces.active.region_3d.view_perspective = 'CAMERA'
         note = f" ({note})" if note else ""
         return self.done(
             f"Created a forest of {plants} plants{note}. Press F12 to render it, click Refine to see it here"

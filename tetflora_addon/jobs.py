@@ -64,18 +64,18 @@ class Pace:
 
     Parameters
     ----------
-    least : float
-        Seconds of work where drawing takes no time.
+    least, most : float
+        Seconds of work where drawing takes no time, and where it takes long.
     """
 
-    def __init__(self, least: float) -> None:
-        self._least, self._left = least, time.monotonic()
+    def __init__(self, least: float, most: float = _LONGEST) -> None:
+        self._least, self._most, self._left = least, most, time.monotonic()
         self._end, self._slow = self._left, False
 
     def begin(self) -> None:
         """Work begins; what has passed since it was left is what a redraw takes."""
         now = time.monotonic()
-        seconds = min(_REDRAWS * (now - self._left), _LONGEST)
+        seconds = min(_REDRAWS * (now - self._left), self._most)
         self._end, self._slow = now + max(self._least, seconds), seconds > _REDRAWS * _SLOW
 
     def goes_on(self, progress: Progress) -> bool:

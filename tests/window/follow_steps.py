@@ -1,6 +1,9 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Refine Automatically follows a viewport that is turned; tests/window/test_follow.py judges what came of it."""
+"""Rendered shading refines what a viewport shows by itself, while that is turned, plants are moved, and undone.
+
+Blender's Workbench draws it, which takes no time; tests/window/test_follow.py judges what came of it.
+"""
 
 import math
 import sys
@@ -16,9 +19,9 @@ from devtools.aliases import INSTALLED, alias
 
 alias(INSTALLED)
 from tetflora_addon.blender.results.collection import result_collections  # noqa: E402  (found only now)
-from tetflora_addon.blender.viewport import auto  # noqa: E402
+from tetflora_addon.blender.viewport import auto, state  # noqa: E402
 
-PLANTS, APART = 16, 9.0
+PLANTS, APART = 9, 9.0
 
 
 def steps(ui):
@@ -26,6 +29,7 @@ def steps(ui):
     scene = bpy.context.scene
     bpy.ops.object.select_all(action='SELECT')
     bpy.ops.object.delete()
+    scene.render.engine = 'BLENDER_WORKBENCH'
     side = math.isqrt(PLANTS)
     for i in range(PLANTS):
         plant = bpy.data.objects.new(f"plant {i}", None)
@@ -33,15 +37,17 @@ def steps(ui):
         plant.tetflora.is_plant, plant.tetflora.species, plant.tetflora.seed = True, "oak", i
         scene.collection.objects.link(plant)
     space = ui.area().spaces.active
-    space.overlay.show_overlays = False
     space.clip_end = 1000.0
     ui.values["camera"] = scene.camera is not None
     look(space, 20.0, 3.0)
     scene.tetflora.quality = 'PREVIEW'
-    scene.tetflora.follow_viewport = True
+    bpy.ops.ed.undo_push(message="a wood")
+    yield from ui.until(lambda: state.find(scene) is not None and state.find(scene).shapes is not None, 30, "shapes")
+    ui.values["on_before"] = scene.tetflora.auto_refine
     begun = time.monotonic()
-    scene.tetflora.auto_refine = True
-    yield from ui.until(lambda: finished(scene), 20, "first look")
+    space.shading.type = 'RENDERED'
+    yield from ui.until(lambda: scene.tetflora.auto_refine, 10, "on by itself")
+    yield from ui.until(lambda: finished(scene), 60, "first look")
     ui.values["first_look_s"] = time.monotonic() - begun
     ui.values["first"] = polygons(scene)
     yield from ui.picture("first")
@@ -56,7 +62,31 @@ def steps(ui):
     ui.values["far"] = polygons(scene)
     yield from ui.picture("far")
     ui.values["message"] = auto.message()
-    scene.tetflora.auto_refine = False
+    yield from changed_and_undone(ui, space)
+    bpy.context.scene.tetflora.auto_refine = False
+
+
+def changed_and_undone(ui, space):
+    """Turn the view by a key while it is refined, move a plant, undo that in the middle, and look at Solid shading."""
+    ui.move(*ui.center())
+    look(space, 70.0, 60.0)
+    yield from ui.until(lambda: bool(auto.message()), 30, "it begins anew")
+    due = auto._state.due
+    ui.press('NUMPAD_4')
+    yield from ui.until(lambda: auto._state.due > due, 30, "it waits until the view is quiet")
+    ui.values["turned"] = auto.message()
+    bpy.data.objects["plant 0"].location.x += 500.0
+    bpy.ops.ed.undo_push(message="moved")
+    yield from ui.until(lambda: bool(auto.message()), 60, "it begins anew for the plant")
+    ui.press('Z', ctrl=True)
+    yield from ui.until(lambda: bpy.data.objects["plant 0"].location.x < 400.0, 30, "undone")
+    yield from ui.until(lambda: quiet(bpy.context.scene) and auto._state.steps is None, 120, "after undo")
+    ui.values["undone"] = polygons(bpy.context.scene)
+    ui.values["on_after_undo"] = bpy.context.scene.tetflora.auto_refine
+    yield from ui.picture("undone")
+    ui.area().spaces.active.shading.type = 'SOLID'
+    yield from ui.until(lambda: not bpy.context.scene.tetflora.auto_refine, 10, "off by itself")
+    ui.values["kept"] = polygons(bpy.context.scene)
 
 
 def look(space, tilt, distance):

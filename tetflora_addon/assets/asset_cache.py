@@ -89,12 +89,7 @@ def _read(path: Path, digest: str) -> Asset | None:
 
 
 def _check(asset: Asset, digest: str) -> None:
-    """Refuse what is not an asset.
-
-    Raises
-    ------
-    ValueError
-    """
+    """Refuse what is not an asset by a ValueError."""
     for kind, rows in ((Clusters, asset.clusters), (SurfaceSamples, asset.samples), (AssetKites, asset.leaves)):
         model = kind.empty()
         for f in fields(kind):

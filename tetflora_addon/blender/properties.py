@@ -195,7 +195,7 @@ class TetFloraScene(RefinementProperties, AnimationProperties, library.BiomeChoi
     auto_refine: boolean(
         "Refine Automatically",
         "Refine shortly after the camera, plants or settings change, without blocking Blender. A further change "
-        "restarts the work. Large forests keep the processor busy",
+        "restarts the work. While a viewport has Rendered shading, on by itself for what that shows",
         update=_notify_auto_refine,
         **FIXED,
     )

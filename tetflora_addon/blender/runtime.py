@@ -425,14 +425,13 @@ def last_error() -> tuple[str, list[str]]:
     return _last
 
 
-def redraw(sidebars: bool = True) -> None:
-    """Redraw all 3D views in all windows, with their headers, toolbars and sidebars or without."""
+def redraw(only: str = "") -> None:
+    """Redraw all 3D views in all windows: all of their regions, or those of one type alone."""
     for window in getattr(bpy.context.window_manager, "windows", ()):
         for area in window.screen.areas:
-            if area.type == 'VIEW_3D':
-                for region in area.regions:
-                    if sidebars or region.type == 'WINDOW':
-                        region.tag_redraw()
+            for region in area.regions if area.type == 'VIEW_3D' else ():
+                if only in ("", region.type):
+                    region.tag_redraw()
 
 
 def complain(text: str) -> None:

@@ -13,10 +13,9 @@ it is drawn. In each part of the image they lie one behind the other: as many as
 behind them or out of view few facets are made. So numbers follow from the rules of drawing and the budget, with their
 own constants; only how many layers fill a pixel is measured.
 
-Seconds follow from the pixels that are tested and the branches that are opened, beside which leaves cost little. They
-are fitted to the processor's seconds of the scenes of ``python -m benchmarks estimates``, all together to birches at
-1920 × 1080 on two cores, whenever refinement changes; those of what is expanded to plants of three species. Other
-machines differ by their speed.
+Seconds follow from the plants and branches that are opened, and from what is made. They are fitted to the processor's
+seconds of the scenes of ``python -m benchmarks estimates``, so that the largest error is least, whenever refinement
+changes; those of what is expanded to plants of three species. Other machines differ by their speed.
 
 The leaves and the wood that are near a camera are far finer: a spruce three meters away has a hundred times as many
 polygons as the same one from afar. Branches are few beside the polygons on them, so where all is expanded the nearest
@@ -41,7 +40,7 @@ from ..refinement.settings import RefinementSettings
 from ..subplants.pieces import expand
 from ..subplants.rings import BUD_RINGS, bud_sides, finer, round_up_to
 from ..subplants.tubes import tube_faces
-from .drawing import HIDDEN, HIDDEN_A_PIXEL, HIDDEN_LEAVES, LIT_LEAVES, NEVER_TOO_MANY, OUTSIDE_A_PIXEL, SHADOW
+from .drawing import HIDDEN, HIDDEN_A_PIXEL, HIDDEN_LEAVES, LIT_LEAVES, NEVER_TOO_MANY, OUTSIDE_A_PIXEL, SHADOW, TILE
 from .frontier import DETAIL
 from .plants import BENT, BROAD, NEARER, SIDES, TOLERANCE, TUBES, TWIG, LeafDetail, kite_widths
 
@@ -170,15 +169,14 @@ def _large(result: Refinement) -> Floats:
     return np.bincount(held.cell[large], minlength=len(result.tree))[result.nodes].astype(np.float64)
 
 
-#: Seconds of any refinement, of each plant, of each covered pixel, and of each branch that is seen and its primitives.
-SECONDS = 0.6
-SECONDS_PER_PLANT = 2.5e-5
-SECONDS_PER_PIXEL = 2.7e-5
-SECONDS_PER_BRANCH = np.array([3.3e-6, 2.4e-5])
+#: Seconds of any refinement, of each plant, and of each polygon or facet.
+SECONDS, SECONDS_PER_PLANT, SECONDS_MADE = 0.6, 2.5e-5, 1.92e-6
+#: Of what is opened: the root of how many plants are seen, of which far ones are few parts, and what branches become.
+SECONDS_OPENED = np.array([0.6, 2.18e-5])
 #: Seconds of each polygon, and of each triangle of those that are expanded.
 SECONDS_EXPANDED = np.array([5e-7, 1.2e-7])
-#: Bytes of each plant.
-BYTES_PER_PLANT = 500.0
+#: Bytes of each plant, of each process that draws, and of each polygon or facet of the tile that it draws.
+BYTES_PER_PLANT, BYTES_PER_PROCESS, BYTES_IN_TILE = 500.0, 130e6, 350.0
 #: Leaves and branches that are looked at, about, how many of them lie in a cell of the image, and how many of a plant
 #: in view for one of a plant that is not.
 _PARTS, _IN_CELL, _IN_VIEW = 4096, 32, 16.0
@@ -273,7 +271,13 @@ class Estimate:
 
 
 def estimate(
-    stand: Stand, camera: Camera, settings: RefinementSettings, used: float, allowed: float, everything: bool = False
+    stand: Stand,
+    camera: Camera,
+    settings: RefinementSettings,
+    used: float,
+    allowed: float,
+    everything: bool = False,
+    processes: int = 0,
 ) -> Estimate:
     """Estimate a refinement.
 
@@ -288,21 +292,24 @@ def estimate(
         Bytes left for results, see `memory.allowance`; infinite without a limit.
     everything : bool
         Whether plants are expanded instead of refined; limits do not hold then.
+    processes : int
+        That draw tiles beside Blender; 0 where it does so itself.
     """
     parts, plant = stand.parts(camera)
     extent = camera.extent_around(parts.position)
     whole = _polygons(stand.crowns, parts, stand.which[plant], camera, extent)
     plants = round(stand.number.sum())
     seconds, memory = SECONDS + SECONDS_PER_PLANT * plants, used + BYTES_PER_PLANT * plants
+    memory += BYTES_PER_PROCESS * processes
     if everything:
         made = whole @ parts.number
         memory += BYTES_PER_TRIANGLE * float(made[1])
         return Estimate(plants, float(made[0]), seconds + float(SECONDS_EXPANDED @ made), memory, False)
-    wanted, covered, branches = _numbers(stand, camera, settings, parts, plant, extent, whole[0])
+    wanted, opened = _numbers(stand, camera, settings, parts, plant, extent, whole[0])
     made = min(wanted, settings.max_polygons or np.inf, allowed / BYTES_PER_POLYGON)
-    opened = float(SECONDS_PER_BRANCH @ branches) * made / max(wanted, 1.0)
-    seconds += SECONDS_PER_PIXEL * covered + opened + float(SECONDS_EXPANDED[0]) * made
-    memory += BYTES_PER_POLYGON * made
+    seconds += SECONDS_MADE * made + float(SECONDS_OPENED @ opened) * made / max(wanted, 1.0)
+    busy = min(max(processes, 1) / max(camera.width // TILE, 1), 1.0)
+    memory += (BYTES_PER_POLYGON + busy * BYTES_IN_TILE) * made
     return Estimate(plants, made, seconds, memory, wanted > made)
 
 
@@ -314,8 +321,8 @@ def _numbers(
     plant: Integers,
     extent: Floats,
     whole: Floats,
-) -> tuple[float, float, Floats]:
-    """Polygons and facets without limits, covered pixels, and the branches that are seen with their primitives (2,).
+) -> tuple[float, Floats]:
+    """Polygons and facets without limits, and what is opened (2,), see `SECONDS_OPENED`.
 
     ``whole`` (n,) is `_polygons` of parts, ``extent`` (n,) meters of a pixel.
     """
@@ -357,7 +364,9 @@ def _numbers(
         (leaves[~beside].sum(), OUTSIDE_A_PIXEL),
     ):
         unseen += min(float(number), max(a_pixel * pixels, NEVER_TOO_MANY) / coarser**2)
-    return seen + unseen, covered, drawn_number[wood] @ np.stack([np.ones(int(wood.sum())), branch[wood]], axis=1)
+    shown, there = (np.bincount(plant[inside], of, len(stand.number)) for of in (drawn_number, parts.number))
+    plants = stand.number @ (shown / np.maximum(there, 1e-9))
+    return seen + unseen, np.array([np.sqrt(plants), (drawn_number * branch)[wood].sum()])
 
 
 def _inside(parts: CrownParts, camera: Camera, extent: Floats) -> Mask:

@@ -348,15 +348,7 @@ class _Child:
 
 
 def _call(function: Callable[[_Shared, _Item], _Result], shared: _Given, item: _Item) -> _Result:
-    """The function's result by a process; another takes over for one that has ended, and in the end this one.
-
-    Raises
-    ------
-    Closed
-        `stop` was called.
-    Exception
-        What the function raises.
-    """
+    """The function's result by a process; another takes over for one that has ended, and in the end this one."""
     answer, tried = None, 0
     while answer is None and tried < 2 and (own := _taken()) is not None:
         try:

@@ -287,8 +287,6 @@ def _perimeter(sides: int) -> float:
 def _bent_alike(old: Order, new: Order) -> Order:
     """An order whose tips are where they were with another number of segments.
 
-    Notes
-    -----
     Joint j of S turns by curvature / S, and by curvature_tip / S from the middle on, and moves the tip by its turn
     times 1 - j / S of the length (see `growth.axes`). That sums up to less where segments are few, and to nothing for a
     single one, which takes the direction of the chord instead. The random parts of joints are independent, so that

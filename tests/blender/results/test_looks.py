@@ -4,6 +4,8 @@
 
 from __future__ import annotations
 
+import json
+
 import bpy
 import numpy as np
 import pytest
@@ -11,7 +13,9 @@ import pytest
 from tests.blender.scenes import add_camera, add_mesh, add_plant, depsgraph, tiny_render
 from tetflora_addon.blender.attributes import read
 from tetflora_addon.blender.job import refine
+from tetflora_addon.blender.scene import looks
 from tetflora_addon.blender.scene.fields import write_field
+from tetflora_addon.blender.scene.looks import LayerLooks
 from tetflora_addon.blender.scene.objects import view_layer_groups
 
 LEFT, RIGHT = (-3.0, 0.0, 0.0), (3.0, 0.0, 0.0)
@@ -208,3 +212,72 @@ def test_output_settings_hide_what_an_object_shows_but_not_the_other_way(scene):
     scene.tetflora.output.camera = False
     assert not any(o.visible_camera for o in (*own, *others))
     assert not any(o.visible_shadow for o in own) and all(o.visible_shadow for o in others)
+
+
+@pytest.fixture
+def viewport(scene):
+    """Context of a 3D viewport, as operators have it that are called from its sidebar; it shows no empties."""
+    window = bpy.context.window_manager.windows[0]
+    area = window.screen.areas[0]
+    before, area.type = area.type, 'VIEW_3D'
+    region = next(region for region in area.regions if region.type == 'WINDOW')
+    area.spaces[0].show_object_viewport_empty = False  # as artists do who see crowns in place of axes
+    yield {"window": window, "area": area, "region": region}
+    area.spaces[0].show_object_viewport_empty = True
+    area.type = before
+
+
+def asked_one_by_one(layer, obj):
+    """What `LayerLooks` says that a view layer adds to an object, by Blender's own words for each object."""
+    with bpy.context.temp_override(area=None):
+        shown = obj.visible_get(view_layer=layer)
+    return not shown, obj.holdout_get(view_layer=layer), obj.indirect_only_get(view_layer=layer)
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_looks_are_those_that_blender_tells_of_each_object(clean_file, monkeypatch, seed):
+    """Collections in collections, objects in several, flags of both at random; in the first two scenes few flags.
+
+    Every other one is read in a render's thread.
+    """
+    monkeypatch.setattr(looks, "on_main_thread", lambda: seed % 2 == 0)
+    rng, scene, layer = np.random.default_rng(seed), bpy.context.scene, bpy.context.view_layer
+    often = 0.02 if seed < 2 else 0.25
+    homes = [scene.collection]
+    for number in range(12):
+        made = bpy.data.collections.new(f"c{number}")
+        homes[rng.integers(len(homes))].children.link(made)
+        made.hide_viewport = bool(rng.random() < often)
+        homes.append(made)
+    objects = [bpy.data.objects.new(f"o{number}", None) for number in range(150)]
+    for obj in objects:
+        for home in rng.choice(len(homes), rng.integers(1, 4), replace=False):
+            homes[home].objects.link(obj)
+        obj.hide_viewport = bool(rng.random() < often)
+    waiting = list(layer.layer_collection.children)
+    while waiting:
+        one = waiting.pop()
+        for flag in ("exclude", "hide_viewport", "holdout", "indirect_only"):
+            if rng.random() < often:
+                setattr(one, flag, True)
+        waiting += one.children
+    for obj in objects:
+        if rng.random() < often and obj.name in layer.objects:
+            obj.hide_set(True, view_layer=layer)
+    bpy.data.objects.new("in no collection", None)
+    found, seen = LayerLooks(layer), LayerLooks(layer, viewports=False)
+    for obj in bpy.data.objects:
+        hidden, holdout, indirect = asked_one_by_one(layer, obj)
+        said = json.loads(found.of(obj) or "{}")
+        assert bool(said.get("hide_viewport")) == (hidden or obj.hide_viewport), obj.name
+        assert bool(said.get("is_holdout")) == holdout and ("camera" in said.get("off", ())) == indirect, obj.name
+        assert "hide_viewport" not in json.loads(seen.of(obj) or "{}") or obj.hide_viewport
+
+
+def test_what_one_viewport_leaves_out_is_not_hidden_in_all(scene, viewport):
+    plant = as_plant(scene)
+    with bpy.context.temp_override(**viewport):
+        assert not plant.visible_get()
+        refine.refine(scene, depsgraph())
+    made = [o for o in scene.objects if o.get("tetflora_kind")]
+    assert made and not any(o.hide_viewport for o in made)

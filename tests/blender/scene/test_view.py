@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tests.blender.scenes import add_camera
-from tetflora_addon.blender.scene.camera import camera_of, read_camera, view_camera, viewport_of
+from tetflora_addon.blender.scene.camera import camera_of, is_rendered, read_camera, view_camera, viewport_of
 
 pytestmark = pytest.mark.usefixtures("clean_file")
 
@@ -67,3 +67,23 @@ def test_the_default_viewport_is_seen_along_its_axis(region_3d):
 def test_a_viewport_that_looks_through_the_camera_has_no_view_of_its_own(region_3d):
     region_3d.view_perspective = 'CAMERA'
     assert view_camera(bpy.context.scene) is None
+
+
+def test_a_viewport_in_rendered_shading_is_the_one_even_if_it_looks_through_the_camera():
+    """Beside one in another shading, where the artist works."""
+    areas = bpy.context.window_manager.windows[0].screen.areas
+    space, _ = viewport_of(bpy.context.scene)
+    other = next(area for area in areas if area.type == 'OUTLINER')
+    other.type = 'VIEW_3D'
+    second = other.spaces.active
+    try:
+        assert not is_rendered(bpy.context.scene)
+        second.region_3d.view_perspective, second.shading.type = 'CAMERA', 'RENDERED'
+        assert is_rendered(bpy.context.scene) and view_camera(bpy.context.scene) is None
+        second.region_3d.view_perspective = 'PERSP'
+        assert viewport_of(bpy.context.scene)[0] == second
+        second.shading.type = 'SOLID'
+        assert viewport_of(bpy.context.scene)[0] == space
+    finally:
+        second.region_3d.view_perspective, second.shading.type = 'PERSP', 'SOLID'
+        other.type = 'OUTLINER'

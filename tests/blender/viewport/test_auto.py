@@ -11,11 +11,12 @@ import bpy
 import pytest
 
 from tests.blender.scenes import add_camera, add_mesh, add_plant, datablocks
+from tetflora_addon import jobs
 from tetflora_addon.blender import compat
 from tetflora_addon.blender.job import refine
 from tetflora_addon.blender.results import collection
 from tetflora_addon.blender.scene.camera import read_camera
-from tetflora_addon.blender.viewport import auto
+from tetflora_addon.blender.viewport import auto, levels
 from tetflora_addon.jobs import Progress
 
 
@@ -28,7 +29,7 @@ def scene(clean_file):
     scene.render.resolution_x, scene.render.resolution_y = 48, 36
     bpy.context.view_layer.update()
     yield scene
-    scene.tetflora.auto_refine = False
+    bpy.context.scene.tetflora.auto_refine = False
 
 
 def settle(monkeypatch) -> int:
@@ -398,3 +399,84 @@ def test_a_scene_that_is_renamed_is_still_refined_and_not_once_more(scene, monke
     scene.name = "renamed again"
     auto.schedule(scene)
     assert settle(monkeypatch) == 0
+
+
+@pytest.fixture
+def shading(scene, monkeypatch):
+    """Sets the shading of the window's viewport, of which there is none here, and lets the timer look at it."""
+    rendered = [False]
+    monkeypatch.setattr(auto, "is_rendered", lambda _: rendered[0])
+    levels.read_shapes(scene, bpy.context.evaluated_depsgraph_get())
+
+    def shade(kind: str) -> bool:
+        rendered[0] = kind == 'RENDERED'
+        auto.watch()
+        return bpy.context.scene.tetflora.auto_refine  # undo makes another scene
+
+    yield shade
+    shade('SOLID')
+
+
+def test_rendered_shading_switches_it_on_for_the_viewport_and_another_one_off(scene, shading, monkeypatch):
+    views = [read_camera(scene, bpy.context.evaluated_depsgraph_get())]
+    monkeypatch.setattr(auto, "view_camera", lambda _: views[-1])
+    scene.camera = None
+    assert not shading('SOLID') and shading('RENDERED')
+    assert settle(monkeypatch) > 5
+    made = results(scene)
+    assert len(made) == 1
+    assert shading('RENDERED') and not shading('SOLID')
+    assert results(scene) == made
+
+
+def test_what_the_artist_switches_stays_as_it_is(scene, shading):
+    scene.tetflora.auto_refine = True
+    assert shading('RENDERED') and shading('SOLID')
+    scene.tetflora.auto_refine = False
+    assert shading('RENDERED')
+    scene.tetflora.auto_refine = False
+    assert not shading('RENDERED'), "it would not let itself be switched off"
+    assert not shading('SOLID') and shading('RENDERED')
+
+
+def test_scenes_without_plants_are_left_alone_in_rendered_shading(scene, shading):
+    plants = [bpy.data.objects[f"tree {number}"] for number in range(3)]
+    bpy.data.batch_remove(plants)
+    levels.read_shapes(scene, bpy.context.evaluated_depsgraph_get())
+    assert not shading('RENDERED')
+    add_plant("first")
+    bpy.context.view_layer.update()
+    levels.read_shapes(scene, bpy.context.evaluated_depsgraph_get())
+    assert shading('RENDERED')
+
+
+def test_what_rendered_shading_switched_on_goes_off_in_a_file_that_was_saved_so(scene, shading, tmp_path):
+    assert shading('RENDERED')
+    path = str(tmp_path / "saved.blend")
+    bpy.ops.wm.save_as_mainfile(filepath=path, copy=True)
+    bpy.ops.wm.open_mainfile(filepath=path)
+    assert bpy.context.scene.tetflora.auto_refine and not shading('SOLID')
+
+
+def test_undo_of_a_step_before_leaves_it_as_the_shading_has_it(scene, shading):
+    bpy.ops.ed.undo_push(message="before")
+    shading('RENDERED')
+    add_plant("another", seed=9)
+    bpy.ops.ed.undo_push(message="while it is rendered")
+    bpy.ops.ed.undo()
+    assert shading('RENDERED') and not shading('SOLID')
+    bpy.ops.ed.redo()  # a step in which it was on
+    assert not shading('SOLID')
+
+
+def test_a_slice_never_waits_for_the_engine_however_long_the_window_took_to_draw(scene, monkeypatch):
+    def waiting():
+        while True:
+            yield Progress(0.5, "computing", waiting=True)
+
+    monkeypatch.setattr(jobs.time, "sleep", lambda _: pytest.fail("the window stands still"))
+    scene.tetflora.auto_refine = True
+    auto._state.steps = waiting()
+    auto._state.pace._left -= 9.0  # the last redraw took so long
+    assert auto.tick() == auto.SLICE
+    auto.stop()

@@ -72,6 +72,19 @@ def test_numbers_follow_pixels_and_not_plants_once_the_picture_is_full():
     assert _estimate(_stand(10)).primitives < 0.2 * wood.primitives
 
 
+def test_processes_take_what_the_tiles_take_that_they_draw():
+    """Of an image of one tile one of them has work, and of one of many all; an empty picture takes what they are."""
+    small, wood = _camera(240, 240), _stand(10_000)
+    alone, two, four = (_estimate(wood, small, processes=number) for number in (0, 2, 4))
+    each = (four.memory - two.memory) / 2.0
+    assert 5e7 < each < 3e8 and two.memory - alone.memory == pytest.approx(2.0 * each)
+    wide = _camera(8 * 240, 1080)
+    at_work = [_estimate(wood, wide, processes=number).memory - number * each for number in (0, 2, 4, 8, 16)]
+    tile = at_work[1] - at_work[0]
+    assert 200.0 < tile * 8 / _estimate(wood, wide).primitives < 600.0
+    assert np.diff(at_work) == pytest.approx(tile * np.array([1.0, 2.0, 4.0, 0.0]), rel=1e-3)
+
+
 def test_plants_that_are_near_and_seen_are_looked_at_most():
     camera, stand = _camera(), _stand(3000)
     near = replace(stand, foot=np.concatenate([[[0.0, 8.0, 0.0]], stand.foot[1:]]))

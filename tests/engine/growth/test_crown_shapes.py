@@ -160,4 +160,4 @@ def test_forms_end_at_their_limits() -> None:
     """A crown is a fifth to three times as wide as described, and no limb is more than four fifths shorter."""
     least, most = crown_shapes(2, *np.array([[-9.0, 9.0]] * 6))
     assert_array_equal(least, [0.2, 0.0, -0.8, -0.8, 0.2, 0.01])
-    assert_array_equal(most, [3.0, 0.95, 0.8, 0.8, 5.0, 4.0])
+    assert_array_equal(most, [3.0, 0.95, 0.8, 0.8, 5.0, 6.0])

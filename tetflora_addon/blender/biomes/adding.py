@@ -205,13 +205,7 @@ def _plant(data: JobData, uid: str, stands: Sequence[tuple[str, int]], without: 
 
 
 def _own_species(scene: bpy.types.Scene, biome: Biome) -> dict[str, str]:
-    """Keep the biome's own species in this file; what they are called here, where that differs.
-
-    Raises
-    ------
-    SceneError
-        A layer needs a species that is nowhere.
-    """
+    """Keep the biome's own species in this file, or tell that one is nowhere; what they are called if not alike."""
     renamed = {}
     for identifier, page in pages_of(scene, biome).items():
         name, known = identifier, catalog()

@@ -261,13 +261,7 @@ def _export(options: argparse.Namespace) -> dict:
 
 
 def _check_file() -> None:
-    """Refuse to go on where Blender could not open the file, and would render its default cube instead.
-
-    Raises
-    ------
-    SceneError
-        The command line names a file, and none is open.
-    """
+    """Refuse to go on where Blender could not open the file, and would render its default cube instead."""
     named = [
         text
         for text in takewhile(lambda text: text not in ("--command", "--"), sys.argv)

@@ -68,11 +68,11 @@ def forecast(scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer) -> Estimat
         camera = read_camera(scene, depsgraph)
     except TetFloraError:
         return None
-    others = pool.share(memory.limit(most_memory(scene)))
-    used = (memory.resident() or 0) + others + picture_bytes(scene, camera)
+    used = (memory.resident() or 0) + picture_bytes(scene, camera)
+    processes = pool.number(memory.limit(most_memory(scene)))
     allowed = memory_left(scene, camera)
     everything = scene.tetflora.expand_everything
-    return estimate(stand, camera, settings_from(scene), used, allowed, everything)
+    return estimate(stand, camera, settings_from(scene), used, allowed, everything, processes)
 
 
 def learn(expected: Estimate | None, seconds: float) -> None:

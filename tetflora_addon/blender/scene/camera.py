@@ -193,13 +193,6 @@ def _while_open(
 def _stereo_views(scene: bpy.types.Scene, camera: Camera, depsgraph: bpy.types.Depsgraph) -> tuple[Camera, ...]:
     """Cameras that a scene renders beside its active one; none without stereoscopy.
 
-    Parameters
-    ----------
-    camera : Camera
-        The active one.
-
-    Notes
-    -----
     *Stereo 3D* moves the camera by half of the distance of the eyes to either side (or all of it, by the pivot), and
     lets the views meet at the distance of convergence: by shifting the window, by turning the camera, or not at all.
     *Multi-View* has a camera for each suffix of a name.
@@ -258,31 +251,37 @@ def timeline_moves() -> bool:
     return any(screen.is_animation_playing or screen.is_scrubbing for screen in screens)
 
 
-def views_of(scene: bpy.types.Scene) -> list[Floats]:
-    """Matrices (4, 4) from the world to clip space of all viewports that show a scene, as they were last drawn."""
+def _viewports(scene: bpy.types.Scene) -> list[tuple[bpy.types.SpaceView3D, bpy.types.Area]]:
     manager = bpy.context.window_manager
     windows = [window for window in ([] if manager is None else manager.windows) if window.scene == scene]
-    spaces = [area.spaces.active for window in windows for area in window.screen.areas if area.type == 'VIEW_3D']
-    views = [view for space in spaces for view in (space.region_quadviews or [space.region_3d])]
+    areas = [area for window in windows for area in window.screen.areas if area.type == 'VIEW_3D']
+    return [(area.spaces.active, area) for area in areas]
+
+
+def views_of(scene: bpy.types.Scene) -> list[Floats]:
+    """Matrices (4, 4) from the world to clip space of all viewports that show a scene, as they were last drawn."""
+    views = [view for space, _ in _viewports(scene) for view in (space.region_quadviews or [space.region_3d])]
     return [np.array(view.perspective_matrix, np.float64) for view in views]
 
 
-def viewport_of(scene: bpy.types.Scene) -> tuple[bpy.types.SpaceView3D, bpy.types.Region] | None:
-    """The viewport of a scene that has a view of its own: one with rendered shading if there is one, else the largest.
+def is_rendered(scene: bpy.types.Scene) -> bool:
+    """Whether a viewport shows a scene in *Rendered* shading."""
+    return any(space.shading.type == 'RENDERED' for space, _ in _viewports(scene))
 
-    None where all look through the camera, or where there is no window.
+
+def viewport_of(scene: bpy.types.Scene) -> tuple[bpy.types.SpaceView3D, bpy.types.Region] | None:
+    """The viewport to refine a scene for: with rendered shading if there is one, with a view of its own, the largest.
+
+    None where that one looks through the camera, or where there is no window.
     """
     found = []
-    manager = bpy.context.window_manager
-    for window in [] if manager is None else manager.windows:
-        for area in window.screen.areas if window.scene == scene else ():
-            if area.type != 'VIEW_3D' or area.spaces.active.region_3d.view_perspective == 'CAMERA':
-                continue
-            region = next((r for r in area.regions if r.type == 'WINDOW'), None)
-            if region is not None and min(region.width, region.height) > 1:
-                rendered = area.spaces.active.shading.type == 'RENDERED'
-                found.append(((rendered, region.width * region.height), area.spaces.active, region))
-    return max(found, key=lambda one: one[0])[1:] if found else None
+    for space, area in _viewports(scene):
+        region = next((r for r in area.regions if r.type == 'WINDOW'), None)
+        if region is not None and min(region.width, region.height) > 1:
+            own = space.region_3d.view_perspective != 'CAMERA'
+            found.append(((space.shading.type == 'RENDERED', own, region.width * region.height), space, region))
+    best = max(found, key=lambda one: one[0], default=None)
+    return None if best is None or not best[0][1] else best[1:]
 
 
 def view_camera(scene: bpy.types.Scene) -> Camera | None:

@@ -5,7 +5,8 @@
 A change stops the work, which starts again after `QUIET` seconds without changes. Where the digest of everything that
 refinement depends on is the same as last time, nothing is done. Earlier results stay until there are new ones, but not
 through undo. Undo, loading, rendering, and operators that change results stop the work too, because it holds datablocks
-that they remove. Blender tells nobody when a viewport is turned: where that is to be followed, it is looked at.
+that they remove. Blender tells nobody when a viewport is turned or shaded otherwise, so it is looked at: while one
+shows plants in *Rendered* shading it is on by itself, for that view, unless the artist switches it off there.
 """
 
 import time
@@ -28,11 +29,11 @@ from ..properties import auto_refine_switched
 from ..results.collection import has_results
 from ..results.leaf_objects import leaf_objects
 from ..results.output import PURPOSE, remove_collection, result_collections
-from ..runtime import GoneError, Handlers, call_off, call_soon, in_order, listening, redraw, with_uid
-from ..scene.camera import view_camera
+from ..runtime import GoneError, Handlers, Part, call_off, call_soon, in_order, listening, redraw, with_uid
+from ..scene.camera import is_rendered, view_camera
 from ..scene.fields import stand_years
 from ..settings import season_of, wind_of, years_of
-from .state import camera_now
+from .state import camera_now, find
 
 #: Seconds without a change before it begins, and seconds of work between two redraws.
 QUIET, SLICE = 0.6, 0.02
@@ -50,7 +51,7 @@ class _State:
     steps: Job[Statistics] | None = None
     digest: str = ""  # of the job
     made_for: dict[str, str] = field(default_factory=dict)
-    pace: Pace = field(default_factory=lambda: Pace(SLICE))
+    pace: Pace = field(default_factory=lambda: Pace(SLICE, SLICE))
     due: float = 0.0
     message: str = ""
     working: bool = False  # in here right now: what changes is our own doing
@@ -58,6 +59,8 @@ class _State:
     again: bool = False  # look once more when the job is done
     paused: int = 0  # others that refine
     view: str = ""  # of the viewport when it was looked at last
+    ours: set[int] = field(default_factory=set)  # scenes where Rendered shading has switched it on
+    refused: set[int] = field(default_factory=set)  # where the artist does not want it there
 
 
 _state = _State()
@@ -70,28 +73,53 @@ def message() -> str:
 
 
 def _switched(scene: bpy.types.Scene) -> None:
-    """It was switched on or off in a scene."""
+    """It was switched on or off in a scene, by the artist unless we are at work."""
+    if not _state.working:
+        _state.ours.discard(scene.session_uid)
+        if is_rendered(scene):
+            _state.refused.add(scene.session_uid)
+        _begin_anew(scene)
+
+
+def _begin_anew(scene: bpy.types.Scene) -> None:
     stop()
-    _state.message = ""
+    _state.message = _state.view = ""
     if scene.tetflora.auto_refine:
         schedule(scene)
-        _state.view = ""
         watch()
 
 
+def _follows_viewport(scene: bpy.types.Scene) -> bool:
+    return scene.tetflora.follow_viewport or scene.session_uid in _state.ours
+
+
 def watch() -> float | None:
-    """Refine anew when the viewport of the scene in the window is turned; seconds until the next look."""
+    """Follow how the viewport of the scene in the window is turned and shaded; seconds until the next look."""
     scene = bpy.context.scene
-    if scene is None or not (scene.tetflora.auto_refine and scene.tetflora.follow_viewport):
-        return None
-    view = repr(view_camera(scene))
-    if view != _state.view:
+    if scene is not None:
+        _follow_shading(scene)
+    follows = scene is not None and scene.tetflora.auto_refine and _follows_viewport(scene)
+    if follows and (view := repr(view_camera(scene))) != _state.view:
         before, _state.view = _state.view, view
         if before:
             schedule(scene)
     if not bpy.app.background:
         call_soon(watch, _LOOK)
-    return _LOOK
+    return _LOOK if follows or not bpy.app.background else None
+
+
+def _follow_shading(scene: bpy.types.Scene) -> None:
+    """Switch it on where a viewport shows plants in Rendered shading, and off again where none does."""
+    on, uid, rendered, preview = scene.tetflora.auto_refine, scene.session_uid, is_rendered(scene), find(scene)
+    if not rendered:
+        _state.refused.discard(uid)
+    has_plants = preview is not None and preview.shapes is not None
+    if not on and uid not in _state.refused and has_plants if rendered else on and uid in _state.ours:
+        _state.ours.add(uid)
+        _state.working = True
+        scene.tetflora.auto_refine, _state.working = rendered, False
+        _begin_anew(scene)
+        redraw()
 
 
 def schedule(scene: bpy.types.Scene) -> None:
@@ -164,14 +192,14 @@ def _begin(scene: bpy.types.Scene) -> bool:
     """Start the job if what it depends on has changed."""
     layer = _view_layer(scene)
     layer.update()
-    camera = view_camera(scene) if scene.tetflora.follow_viewport else None
+    camera = view_camera(scene) if _follows_viewport(scene) else None
     digest = scene_digest(scene, layer.depsgraph, camera)
     if _done.get(scene.session_uid) == digest and has_results(scene):
         _state.message = ""
         redraw()
         return False
     _state.digest, _state.again, _state.waiting = digest, False, False
-    _state.made_for, _state.pace = results_made_for(scene), Pace(SLICE)
+    _state.made_for, _state.pace = results_made_for(scene), Pace(SLICE, SLICE)
     _state.steps = refine.refine_steps(scene, layer.depsgraph, camera=camera, first_look=True)
     return True
 
@@ -192,9 +220,9 @@ def _slice(scene: bpy.types.Scene) -> bool:
         return _state.again
     _state.waiting = progress.waiting
     text = f"{progress.fraction:.0%}  {progress.message}"
-    if text != _state.message:  # a redraw of the viewport may take longer than the slice
+    if text != _state.message:
         _state.message = text
-        redraw()
+        redraw('UI')  # the view itself may take longer than the slice
     return True
 
 
@@ -298,8 +326,17 @@ def on_load(*_arguments: object) -> None:
     _done.clear()
     _seen.clear()
     _state.message = _state.view = ""
+    _state.ours.clear()
+    _state.refused.clear()
     call_off(tick)
     call_off(watch)
+
+
+def on_loaded(*_: object) -> None:
+    """Where the file was saved in Rendered shading, that had switched it on."""
+    on = (scene for scene in bpy.data.scenes if scene.tetflora.auto_refine and is_rendered(scene))
+    _state.ours.update(scene.session_uid for scene in on)
+    watch()
 
 
 _HANDLERS = Handlers(
@@ -311,6 +348,7 @@ _HANDLERS = Handlers(
     redo_post=after_undo,
     render_init=lambda *_: in_main_thread(on_interruption),
     load_pre=(on_interruption, on_load),
-    load_post=lambda *_: watch() and None,
+    load_post=on_loaded,
 )
-register, unregister = in_order(listening(_switched, auto_refine_switched), _HANDLERS, end=on_load)
+_FIRST = Part(lambda: call_soon(watch, _LOOK) if not bpy.app.background else None, lambda: None)
+register, unregister = in_order(listening(_switched, auto_refine_switched), _HANDLERS, _FIRST, end=on_load)

@@ -42,6 +42,7 @@ from ..scene.ages import crown_kinds, plainly_aged
 from ..scene.camera import read_camera, timeline_moves, views_of
 from ..scene.crowns import crown_for
 from ..scene.fields import stand_years
+from ..scene.looks import shown_objects
 from ..scene.objects import has_contents, is_drop, taking_part
 from ..scene.plants import NoPlantsError, gone_species, read_asset_plants, read_plants
 from ..settings import season_of, years_of
@@ -101,7 +102,7 @@ def read_shapes(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> Shape
     What is wrong with a plant is reported by `Preview.message`, for the panel, and the earlier plants stay.
     """
     begin, preview, form = time.thread_time(), of(scene), scene.tetflora.preview.plants
-    preview.message, preview.objects, preview.moment = "", _visible(depsgraph.view_layer), _moment(scene)
+    preview.message, preview.objects, preview.moment = "", len(shown_objects(depsgraph.view_layer)), _moment(scene)
     try:
         make = light_plants if form == 'LIGHT' else bounds_of_plants
         preview.shapes = None if form == 'NONE' else _shapes_of(scene, depsgraph, make)
@@ -128,12 +129,6 @@ def _shapes_of(
         return joined(crowns)
     grown = _grown(scene, depsgraph, make, seeds)
     return joined([*grown, *crowns]) if crowns or len(grown) > 1 else grown[0]
-
-
-def _visible(layer: bpy.types.ViewLayer) -> int:
-    """How many objects viewports show, which Blender counts fastest; in the main thread, or the override crashes it."""
-    with bpy.context.temp_override(area=None, view_layer=layer):
-        return len(bpy.context.visible_objects)
 
 
 def _plants_of(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> tuple[Seeds, str]:
@@ -227,7 +222,7 @@ def _on_update(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
             changed = placed and (own.is_plant or own.is_field or is_drop(datablock.original))
         else:  # objects that are deleted or hidden are reported only as updates of what they are in
             known = preview is not None and isinstance(datablock, bpy.types.Scene | bpy.types.Collection)
-            now = (_visible(depsgraph.view_layer), _moment(scene)) if known and not timeline_moves() else None
+            now = (len(shown_objects(depsgraph.view_layer)), _moment(scene)) if known and not timeline_moves() else None
             changed = now is not None and now != (preview.objects, preview.moment)
         if changed:
             schedule()
@@ -284,7 +279,7 @@ def follow(
     preview.shapes = replace(joined(parts) if parts[1:] else parts[0], of=of_all) if parts else None
     preview.moment = _moment(scene)
     preview.made += 1
-    redraw(sidebars=False)
+    redraw('WINDOW')
 
 
 def _moment(scene: bpy.types.Scene) -> tuple:
