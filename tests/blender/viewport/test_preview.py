@@ -342,7 +342,7 @@ def test_the_thread_of_a_render_does_not_touch_the_context(monkeypatch):
     plants[0].hide_set(True)
     told = SimpleNamespace(updates=[SimpleNamespace(id=scene)], view_layer=bpy.context.view_layer)
     counted = []
-    monkeypatch.setattr(levels, "_visible", lambda layer: counted.append(layer) or 0)
+    monkeypatch.setattr(levels, "shown_objects", lambda layer: counted.append(layer) or [])
     monkeypatch.setattr(levels, "schedule", lambda: None)
     thread = Thread(target=_on_update, args=(scene, told))
     thread.start()
