@@ -275,7 +275,7 @@ class Frontier:
             if any(map(len, ready)):
                 yield ready
 
-    def _depths(self, pools: Sequence["_Pool"], number: float) -> tuple[Floats, Floats, Integers, int]:
+    def _depths(self, pools: Sequence[_Pool], number: float) -> tuple[Floats, Floats, Integers, int]:
         """Least depths (n,) of parts, and those before which they have so many facets in each cell, about.
 
         Also their order (n,) by cell and depth, and how many cells there are.
