@@ -44,7 +44,7 @@ from ..species.ages import ages_of, with_age
 from ..species.species import Species
 from ..storage import cached
 from ..subplants.pieces import Pieces, open_subplants
-from .microsurfaces import CIRCUMRADIUS, SIN_60, Facets, by_number, piece_facets, subplant_facets
+from .microsurfaces import CIRCUMRADIUS, SIN_60, FacetRules, Facets, by_number, piece_facets, subplant_facets
 
 #: Weights of the shipped species, made by ``python -m devtools.facet_tables``. Raise `_METHOD` when facets or weights
 #: are made differently.
@@ -396,13 +396,13 @@ class SiblingGroups:
         """Facets of a side in meters for several copies of all side by side, each copy with other facets."""
         if self.pieces is None:
             several = Branches.concatenate([self._copy(self.some, n) for n in range(copies)])
-            return subplant_facets(self.flora, several, np.full(len(several), side))
+            return subplant_facets(self.flora, several, FacetRules(np.full(len(several), side)))
         several = []
         for n in range(copies):
             start, end = (place + n * self.beyond for place in (self.pieces.start, self.pieces.end))
             several.append(replace(self.pieces, branches=self._copy(self.pieces.branches, n), start=start, end=end))
         pieces = Pieces.concatenate(several)
-        return piece_facets(self.flora, pieces, np.full(len(pieces), side))
+        return piece_facets(self.flora, pieces, FacetRules(np.full(len(pieces), side)))
 
     def _copy(self, branches: Branches, number: int) -> Branches:
         key = mix(branches.key + np.uint64(number + 1))

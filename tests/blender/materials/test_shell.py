@@ -29,14 +29,15 @@ def place(
 ):
     """Link shells of the cells (n, 4, 3) with S (n, 6) to the scene."""
     count = len(vertices)
-    buffers = shells.shell_buffers(
-        vertices,
+    cells = shells.Cells(
+        np.asarray(vertices),
         np.full((count, 3), color),
         np.full(count, transmission),
         np.broadcast_to(extinction, (count, 6)),
         np.tile(normal, (count, 1)),
         np.full(count, plane),
     )
+    buffers = shells.shell_buffers(cells)
     material = microsphere.shell_material()
     group = next(n for n in material.node_tree.nodes if n.bl_idname == "ShaderNodeGroup")
     for name, value in {"Stochastic": stochastic, "s": 0.0, "Variation": 0.0, "Roundness": 0.0, **sockets}.items():
@@ -226,16 +227,16 @@ def test_a_camera_inside_sees_what_is_left_of_the_way(name, kind):
 def baked(path, light, extinction):
     """Baked picture of cells (n, 4, 3), far to near, whose radiance at the corners is `light` (n, 4)."""
     count = len(path)
-    buffers = shells.shell_buffers(
-        path,
+    cells = shells.Cells(
+        np.asarray(path),
         np.zeros((count, 3)),
         np.zeros(count),
         ISOTROPIC * extinction[:, None] ** 2,
         np.zeros((count, 3)),
         np.zeros(count),
-        rank=np.arange(count)[::-1],
         light=np.repeat(light[..., None], 3, axis=2),
     )
+    buffers = shells.shell_buffers(cells, rank=np.arange(count)[::-1])
     material = microsphere.baked_shell_material()
     mesh = meshes.write_mesh("shells", buffers, [material])
     bpy.context.scene.collection.objects.link(bpy.data.objects.new("shells", mesh))

@@ -3,18 +3,17 @@
 """Shells keep what the shader relies on: closed, outward faces and exact thickness, wherever the cells are."""
 
 import numpy as np
-import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tetflora_addon.emission.shells import cell_gradients, directional_mean, shell_buffers
+from tetflora_addon.emission.shells import Cells, cell_gradients, directional_mean, shell_buffers
 
 
 def cells(seed: int, count: int = 20, origin: float = 0.0) -> np.ndarray:
     return np.random.default_rng(seed).normal(size=(count, 4, 3)) + origin
 
 
-def build(vertices: np.ndarray, **changes):
+def build(vertices: np.ndarray, rank: np.ndarray | None = None, **changes):
     count = len(vertices)
     values = {
         "color": np.full((count, 3), 0.2),
@@ -23,7 +22,7 @@ def build(vertices: np.ndarray, **changes):
         "normal": np.tile([0.0, 0.0, 2.0], (count, 1)),
         "plane": np.full(count, 0.5),
     }
-    return shell_buffers(vertices, **{**values, **changes})
+    return shell_buffers(Cells(vertices, **{**values, **changes}), rank)
 
 
 @settings(deadline=None, max_examples=25)
@@ -104,7 +103,7 @@ def test_flat_cells_hold_nothing():
 
 
 def test_directional_mean():
-    np.testing.assert_allclose(directional_mean([[4.0, 4.0, 4.0, 0.0, 0.0, 0.0]]), 2.0, rtol=1e-12)
+    np.testing.assert_allclose(directional_mean(np.array([[4.0, 4.0, 4.0, 0.0, 0.0, 0.0]])), 2.0, rtol=1e-12)
     # Flakes of one orientation: the mean of |cos| over the sphere is one half, whatever the orientation.
     axes = np.random.default_rng(0).normal(size=(20, 3))
     x, y, z = (axes / np.linalg.norm(axes, axis=1)[:, None]).T
@@ -113,12 +112,8 @@ def test_directional_mean():
     )
 
 
-def test_no_cells_and_wrong_shapes():
+def test_no_cells():
     assert build(np.zeros((0, 4, 3))).polygons == 0
-    with pytest.raises(ValueError, match="normal must have shape"):
-        build(cells(1), normal=np.zeros((3, 3)))
-    with pytest.raises(ValueError, match="vertices must have shape"):
-        shell_buffers(np.zeros((5, 3)), *[np.zeros(5)] * 5)
 
 
 def test_rank_writes_cells_back_to_front():
@@ -148,8 +143,6 @@ def test_light_stays_with_its_corner():
     expected = places @ np.array([[1.0, 0.0, 2.0], [0.5, 1.0, 0.0], [0.0, 3.0, 1.0]])
     np.testing.assert_allclose(written, expected, atol=1e-5)
     assert not any(name.startswith("tf_light") for name in build(vertices).attributes)
-    with pytest.raises(ValueError, match="light must have shape"):
-        build(vertices, light=light[:, :3])
 
 
 def test_the_noise_of_a_cell_is_even_and_its_own():
