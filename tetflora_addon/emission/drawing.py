@@ -23,7 +23,7 @@ from ..growth.hashing import place_keys, uniform
 from ..processes.pool import in_processes
 from ..proxies.facet_weights import FacetWeights
 from ..proxies.microsurfaces import CIRCUMRADIUS, STRETCH, Facets, pushed_outside_view
-from ..proxies.primitives import Primitive, Triangles, joined, triangle_corners
+from ..proxies.primitives import Primitive, joined, triangle_corners
 from ..refinement.contents import polygon_totals
 from ..refinement.decisions import contributions
 from ..refinement.loop import Refinement
@@ -540,7 +540,8 @@ class _Tile(Canvas):
 
 def _places(drawn: Primitive) -> Floats:
     """A place (n, 3) of each facet, or of what is drawn for it."""
-    return drawn.corners[:, 0].astype(np.float64) if isinstance(drawn, Triangles) else drawn.center.astype(np.float64)
+    place = drawn.center if isinstance(drawn, Facets) else drawn.place
+    return (place if place.ndim == 2 else place[:, 0]).astype(np.float64)
 
 
 def quarters(facets: Facets) -> Facets:
