@@ -20,6 +20,7 @@ from ..buffers import MeshBuffers, concatenate_buffers, kept_faces
 from ..camera.camera import Camera
 from ..compiled.flora import Flora
 from ..growth.hashing import place_keys, uniform
+from ..parallel import blocks
 from ..processes.pool import in_processes
 from ..proxies.facet_weights import FacetWeights
 from ..proxies.microsurfaces import CIRCUMRADIUS, STRETCH, Facets, pushed_outside_view
@@ -177,9 +178,9 @@ def drawn_blocks(given: Drawing) -> Iterator[Block | Parts | Shown]:
     yield from shown
     items: list[tuple] = [(number, *tile) for number, tile in enumerate(tiles)]
     for kind, own in enumerate(outside):
-        for start in range(0, len(own), _OUTSIDE_BATCH):
+        for run in blocks(len(own), _OUTSIDE_BATCH):
             some = [other.take(slice(0)) for other in outside]
-            some[kind] = own.take(slice(start, start + _OUTSIDE_BATCH))
+            some[kind] = own.take(run)
             items.append((len(tiles), None, some, len(some[kind]) / sum(map(len, outside))))
     del tiles, outside
     whole = max(len(items), 1)
