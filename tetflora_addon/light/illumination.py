@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 from typing import Self
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from ..arrays import Arrays, Floats, Floats32, Integers
 from ..camera.camera import Camera, to_eye
@@ -297,16 +297,28 @@ GROUND_PIXELS, OPEN_PIXELS = 1024, 4096
 NEAR_FRACTIONS, NEAR_SHEETS = (1 / 32, 1 / 8), 1000
 
 
+@dataclass(frozen=True)
+class Sources:
+    """Lights and opaque polygons of a scene."""
+
+    lights: Sequence[Light]
+    world: World
+    occluders: Floats  # (t, 3, 3): triangles of ground and buildings, meters
+    ground: Floats  # (3,): their mean color, linear, which lights crowns from below
+
+    def counted_from(self, origin: Floats) -> Self:
+        """The same in coordinates that begin at a place (3,) of the present ones."""
+        lights = tuple(light.counted_from(origin) for light in self.lights)
+        return replace(self, lights=lights, occluders=self.occluders - origin)
+
+
 def shadow_steps(
     clouds: MediumCells,
-    lights: Sequence[Light],
-    world: World,
-    occluders: Floats | None = None,
+    sources: Sources,
     resolution: int = 512,
-    ground: ArrayLike = (0.0, 0.0, 0.0),
-    orders: int = ORDERS,
     sheets: SurfaceElements | None = None,
     near: Near | None = None,
+    orders: int = ORDERS,
 ) -> Generator[float, None, Illumination]:
     """Render a scene from all of its lights; yields the fraction that is done.
 
@@ -316,25 +328,19 @@ def shadow_steps(
     ----------
     clouds : MediumCells
         All tetrahedra that hold something.
-    lights : sequence of Light
-    world : World
-    occluders : (t, 3, 3) float64, optional
-        Triangles of opaque polygons, meters.
+    sources : Sources
     resolution : int
         Longer side of a lamp's buffer, pixels; see `light_resolution`. The sky's are `SKY_FRACTION` of it.
-    ground : (3,) float
-        Mean color of the polygons, which lights crowns from below.
-    orders : int
-        Orders of scattering that are gathered one by one, at least 1.
     sheets : SurfaceElements, optional
         Facets and leaves as they are drawn. Clumps smaller than tetrahedra shadow themselves, which an even cloud does
         not; a pixel should be about as large as a sheet.
     near : Near, optional
         Part of the scene that gets buffers of its own from suns.
+    orders : int
+        Orders of scattering that are gathered one by one, at least 1.
     """
     sheets = SurfaceElements.none(len(clouds)) if sheets is None else sheets
-    lamps = []
-    split = split_areas(tuple(lights))
+    lamps, split, occluders = [], split_areas(tuple(sources.lights)), sources.occluders
     for number, light in enumerate(split):
         buffers = buffers_of(light, clouds, sheets, occluders, resolution, near) if light.shadow else []
         lamps.append(LampBuffers(light, buffers))
@@ -348,25 +354,10 @@ def shadow_steps(
         views = buffers_of(light, clouds, fewer, occluders, fine)
         sky.append(views[0] if views else None)
         yield 0.3 + 0.3 * len(sky) / len(DIRECTIONS)
-    found = Illumination(clouds, sheets, lamps, sky, world, (fewer, number))
-    for fraction in found.scatter(np.asarray(ground, np.float64), max(orders, 1)):
+    found = Illumination(clouds, sheets, lamps, sky, sources.world, (fewer, number))
+    for fraction in found.scatter(sources.ground, max(orders, 1)):
         yield 0.6 + 0.4 * fraction
     return found
-
-
-@dataclass(frozen=True)
-class Sources:
-    """Lights and opaque polygons of a scene."""
-
-    lights: tuple[Light, ...]
-    world: World
-    occluders: Floats  # (t, 3, 3): triangles of ground and buildings, meters
-    ground: Floats  # (3,): their mean color, linear
-
-    def counted_from(self, origin: Floats) -> Self:
-        """The same in coordinates that begin at a place (3,) of the present ones."""
-        lights = tuple(light.counted_from(origin) for light in self.lights)
-        return replace(self, lights=lights, occluders=self.occluders - origin)
 
 
 class SheetList:
@@ -498,6 +489,5 @@ def baked_light(
             away = np.linalg.norm(corners[:, 0] - camera.eye, axis=1)
             radii = (fraction * away.max() for fraction in NEAR_FRACTIONS)
             near = Near(camera.eye, tuple(r for r in radii if (away < r).sum() >= NEAR_SHEETS))
-    scene = sources.lights, sources.world, sources.occluders
-    found = yield from shadow_steps(clouds, *scene, resolution, sources.ground, sheets=sheets, near=near)
+    found = yield from shadow_steps(clouds, sources, resolution, sheets, near)
     return BakedLight(found, inside, camera)

@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from functools import cache
 
@@ -15,7 +16,7 @@ from hypothesis import strategies as st
 from tests.engine import support
 from tetflora_addon.emission.shells import set_apart
 from tetflora_addon.light import buffers
-from tetflora_addon.light.illumination import Illumination, Surfaces, shadow_steps
+from tetflora_addon.light.illumination import Illumination, Sources, Surfaces, shadow_steps
 from tetflora_addon.light.receivers import MediumCells, SurfaceElements
 from tetflora_addon.light.scattering import (
     DIRECTIONS,
@@ -38,9 +39,13 @@ SUN = Light("SUN", np.zeros(3), DOWN, color=np.array([3.0, 2.0, 1.0]))
 _KUHN = [(1, 3, 7), (1, 5, 7), (2, 3, 7), (2, 6, 7), (4, 5, 7), (4, 6, 7)]
 
 
-def shadow_pass(*arguments, **options) -> Illumination:
-    """All steps of the pass at once."""
-    steps = shadow_steps(*arguments, **options)
+def shadow_pass(
+    cells: MediumCells, lights: Sequence[Light], world: World, occluders: np.ndarray | None = None, **options
+) -> Illumination:
+    """All steps of the pass at once; ``ground`` is the color of the occluders."""
+    occluders = np.zeros((0, 3, 3)) if occluders is None else occluders
+    sources = Sources(lights, world, occluders, np.array(options.pop("ground", (0.0, 0.0, 0.0))))
+    steps = shadow_steps(cells, sources, **options)
     while True:
         try:
             next(steps)
