@@ -142,31 +142,27 @@ def piece_facets(
     return leaves if whole is not None else Facets.concatenate([leaves, _wood_of_pieces(flora, pieces, rules)])
 
 
-def pushed_outside_view(facets: Facets, distance_to_view: Callable[[NDArray], NDArray], within: bool = False) -> Facets:
+def pushed_outside_view(facets: Facets, distance_to_view: Callable[[NDArray], NDArray]) -> Facets:
     """Facets that are out of view, moved away from it where they would reach into it, so that they keep their area.
 
     Long ones are shorter and wider there. Where there is no room beside it, they are shrunk, or left out.
-    ``distance_to_view`` gives the distance (n,) of points (n, 3) from the view in meters. With ``within``, facets whose
-    middle is in the view stay as they are.
+    ``distance_to_view`` gives the distance (n,) of points (n, 3) from the view in meters.
     """
     reach, center = CIRCUMRADIUS * facets.side, facets.center
     away = distance_to_view(center)
     if facets.stretch is not None:
-        fits = np.maximum(np.minimum(facets.stretch, away / np.maximum(reach, 1e-12)), 1.0)
-        facets = replace(facets, stretch=np.where((away <= 0.0) & within, facets.stretch, fits))
-    stay = (away <= 0.0) & within
+        fits = np.minimum(facets.stretch, away / np.maximum(reach, 1e-12))
+        facets = replace(facets, stretch=np.maximum(fits, 1.0))
     short = reach - away
-    some = np.flatnonzero((short > 0.0) & (short < _MOST_MOVED * reach) & ~stay)
+    some = np.flatnonzero((short > 0.0) & (short < _MOST_MOVED * reach))
     if len(some):
         here, step = center[some], 0.1 * reach[some, None]
-        slope = (
-            np.stack([distance_to_view(here + step * axis) - distance_to_view(here) for axis in np.eye(3)], axis=1)
-            / step
-        )
+        slope = [distance_to_view(here + step * axis) - distance_to_view(here) for axis in np.eye(3)]
+        slope = np.stack(slope, axis=1) / step
         steep = np.maximum(np.einsum("ni,ni->n", slope, slope), _LEAST_SLOPE)
         center = center.copy()
         center[some] += (short[some] / steep)[:, None] * slope
-    fraction = np.where(stay, 1.0, np.clip(distance_to_view(center) / np.maximum(reach, 1e-12), 0.0, 1.0))
+    fraction = np.clip(distance_to_view(center) / np.maximum(reach, 1e-12), 0.0, 1.0)
     return replace(facets, center=center, side=facets.side * fraction).take(np.flatnonzero(fraction > 0.0))
 
 
