@@ -266,10 +266,8 @@ def _leaf_facets(
     row, owner = made.row, made.owner
     across, along = _in_a_face(flora, row, made.key, made.frame)
     many = made.area / one.clip(1e-300)[owner]
-    on_day = None if branches.year is None else (branches, owner)
-    color = leaf_colors_of_facets(flora, row, made.key, many, *places, on_day)
-    weight, dull = rules.weights(owner), flora.leaf.dull[row]
-    color, lit = cluster_color(color, GLOSS * (1.0 - dull), weight), rules.lit
+    weight, dull, lit = rules.weights(owner), flora.leaf.dull[row], rules.lit
+    color = cluster_color(_leaf_colors(flora, branches, made, many, *places), GLOSS * (1.0 - dull), weight)
     if lit is not None:
         color = lit.colors(color, owner, np.cross(across, along), many)
     # What is mirrored and meets another leaf is lost as such.
@@ -393,24 +391,17 @@ def _along(
     return made.take(np.flatnonzero((t >= first[owner]) & (t < pieces.t1[owner])))
 
 
-OnDay = tuple[Branches, Integers] | None
-
-
-def leaf_colors_of_facets(
-    flora: Flora, row: NDArray, key: NDArray, leaves: NDArray, outward: NDArray, young: NDArray, on_day: OnDay
+def _leaf_colors(
+    flora: Flora, branches: Branches, made: FacetSites, leaves: Floats, outward: Floats, young: Floats
 ) -> Floats:
-    """Colors of facets that stand for several leaves (n,) each: a mean varies less than the color of one leaf.
-
-    ``on_day`` are branches, and those (n,) whose leaves they are, where these may not be as in summer.
-    """
-    several = np.sqrt(np.maximum(leaves, 1))
-    deviation = signed(key, Draw.LEAF_COLOR) / several
+    """Colors (m, 3) of facets that stand for several leaves (m,) of branches each: a mean varies less than one leaf."""
+    several, row = np.sqrt(np.maximum(leaves, 1)), made.row
+    deviation = signed(made.key, Draw.LEAF_COLOR) / several
     mean = mean_leaf_colors(flora.rows, row, outward, young)
-    if on_day is not None:
-        branches, owner = on_day
-        summer, mean = mean, flora.day.own_colors(branches, flora.rows["leaf_kind"][row], mean, owner)
-        day, hue = (gathered(branches.year[:, i], owner) for i in range(2))
-        stages = leaf_stages(flora.rows, row, key, day)
+    if branches.year is not None:
+        summer, mean = mean, flora.day.own_colors(branches, flora.rows["leaf_kind"][row], mean, made.owner)
+        day, hue = (gathered(branches.year[:, i], made.owner) for i in range(2))
+        stages = leaf_stages(flora.rows, row, made.key, day)
         one = leaf_colors_at(flora.rows, row, summer, stages, hue)
         mean = mean + np.where(stages.there, 1.0 / several, 0.0)[:, None] * (one - mean)
     return np.clip(mean + gathered(flora.rows["leaf_color"][:, 1], row) * deviation[:, None], 0, 1)
