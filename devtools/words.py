@@ -35,7 +35,7 @@ _NAMES = {
     r"S[i]ght|P[o]rtions|A[s]setPortions|S[e]enNodes": "PartVisibility, VisibleParts, NodeVisibility",
     r"T[h]rownShadows|t[h]rown_shadows|t[h]rown shadows?": "ShadowReach, cast shadow",
     r"F[a]milies": "SiblingGroups",
-    r"H[o]ldings|p[u]sh_down": "PolygonsByCell",
+    r"H[o]ldings|p[u]sh_down": "PolygonsByCell, sort_into_children",
     r"b[o]unding_bodies|b[o]dy_area": "bounding_capsules, closed_leaf_area",
     r"E[N]OUGH_A_PIXEL": "PRIMITIVES_PER_PIXEL",
     r"r[e]al_fraction|r[e]al_wood": "explicit_fraction, explicit_wood",

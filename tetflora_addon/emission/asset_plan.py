@@ -15,6 +15,7 @@ facets, as many as are needed for that.
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import Self
 
 import numpy as np
@@ -131,7 +132,7 @@ class PlacedClusters(FrontierKind):
 
     def can_open(self, rows: ClusterRows) -> Mask:
         """As of `FrontierKind`; of what is drawn as it is, only what facets tell about."""
-        told = rows.shown & (self.placed.assets.mesh_of[rows.cluster] >= 0) & self._wide(rows)
+        told = rows.shown & (self._mesh_of[rows.cluster] >= 0) & self._wide(rows)
         return (self.placed.assets.clusters.children[rows.cluster] > 0) & ~told
 
     def opened(self, rows: ClusterRows) -> tuple[ClusterRows, Integers]:
@@ -141,11 +142,15 @@ class PlacedClusters(FrontierKind):
 
     def to_be_opened(self, rows: ClusterRows) -> Mask:
         """Those above clusters with meshes of their own, of which some may be real."""
-        return ~rows.shown & (self.placed.assets.mesh_of[rows.cluster] < 0) & (self.explicit(rows)[0] > 0.0)
+        return ~rows.shown & (self._mesh_of[rows.cluster] < 0) & (self.explicit(rows)[0] > 0.0)
 
     def ordered(self, rows: ClusterRows) -> ClusterRows:
         """As of `FrontierKind`."""
         return rows.take(np.argsort(self.placed.keys(rows), kind="stable"))
+
+    @cached_property
+    def _mesh_of(self) -> Integers:
+        return self.placed.assets.mesh_of
 
     def _wide(self, rows: ClusterRows) -> Mask:
         """PlacedClusters (n,) of which leaves are wide enough for kites of theirs to be told apart."""
@@ -168,7 +173,7 @@ class PlacedClusters(FrontierKind):
         some, full = self.explicit(rows)
         number = uniform(self.placed.keys(rows), Draw.TRANSITION)
         whole = ~rows.shown & (rows.cluster == assets.root[asset]) & (full >= self.originals.fraction)
-        own = ~rows.shown & ~whole & (self.placed.assets.mesh_of[rows.cluster] == rows.cluster)
+        own = ~rows.shown & ~whole & (self._mesh_of[rows.cluster] == rows.cluster)
         mesh = own & (number < full)
         kites = own & ~mesh & (number < some) & (assets.clusters.leaves[rows.cluster] > 0)
         for what, chosen in (("original", whole), ("cluster", mesh), ("kites", kites)):

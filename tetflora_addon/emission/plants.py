@@ -43,7 +43,7 @@ from ..refinement.contents import PlantParts, as_pieces, piece_totals
 from ..refinement.decisions import Decision, explicit_fraction
 from ..refinement.lights import Light
 from ..refinement.loop import Refinement
-from ..refinement.shared_parts import SharedParts, SharePoints, opened
+from ..refinement.shared_parts import SharedParts, SharePoints, descend, opened
 from ..species.species import LEAF_KINDS
 from ..subplants.leaf_meshes import leaf_meshes
 from ..subplants.pieces import Thin, expand, whole_pieces
@@ -221,7 +221,7 @@ def inside_explicit(
             [replace(own, part=own.part + np.int32(start)) for (_, own), start in zip(made, first, strict=False)]
         )
         if len(points):
-            points = replace(points, cell=result.tree.descend(points.cell, points.position))
+            points = replace(points, cell=descend(result.tree, points))
 
 
 def explicit_blocks(flora: Flora, result: Refinement, camera: Camera, tolerance: float = np.inf) -> Iterator[Block]:

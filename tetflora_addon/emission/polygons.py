@@ -3,6 +3,7 @@
 """Faces of your own meshes: as the frontier draws them, and as meshes in world space where they stay as they are.
 
 A face stays where it is no smaller than a facet, and where the feature that it belongs to is wide enough to be seen.
+One whose fragments are all kept comes out as the face that it was.
 
 Of many small ones facets are a stochastic simplification (Cook, Halstead, Planck and Ryu, SIGGRAPH 2007): of many small
 triangles few are chosen at random, in proportion to their area, and their facets make up for the rest. The facets of a
@@ -12,7 +13,7 @@ along the triangles of a mesh, which keeps its area with little noise.
 
 from collections.abc import Iterator
 from copy import copy
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Self
 
 import numpy as np
@@ -26,7 +27,7 @@ from ..proxies.microsurfaces import Facets
 from ..refinement.contents import polygon_totals
 from ..refinement.decisions import Decision
 from ..refinement.loop import Refinement
-from ..refinement.polygons import Meshes, Polygons
+from ..refinement.polygons import Meshes, Polygons, area_fractions
 from .frontier import Canvas, FrontierKind, Shown, Waiting, Whose
 
 #: Least fraction of a surface that is opaque where it hides what is behind.
@@ -54,7 +55,8 @@ class FaceRows(Arrays):
 
     def whole(self, meshes: Meshes) -> Polygons:
         """The faces themselves, of meshes."""
-        return Polygons(meshes, self.face, self.instance, self.center, self.reach)
+        none = np.full(len(self), -1, np.int32), np.zeros(0, np.int32), np.zeros((0, 3, 3))
+        return Polygons(meshes, self.face, self.instance, *none, self.center, self.reach)
 
 
 @dataclass(frozen=True)
@@ -134,18 +136,21 @@ def chosen_facets(polygons: Polygons, optical: Floats, side: Floats) -> Facets:
     Their number is random; its expectation is the area over that of a facet.
     """
     meshes = polygons.meshes
-    owner, triangle = polygons.triangles()
+    owner, triangle, fraction = polygons.triangles()
     vector = meshes.vectors(triangle, polygons.instance[owner])
-    own = np.linalg.norm(vector, axis=1)
+    own = fraction * np.linalg.norm(vector, axis=1)
     of_polygon = np.bincount(owner, own, len(polygons))
     rate = optical / (np.maximum(of_polygon, 1e-300) * np.maximum(side, 1e-12) ** 2)
-    key = key_of_seed(polygons.instance)[owner]
+    key = _keys(polygons, owner)
     pick, number = spread(np.floor(own * rate[owner] + stepped(key, triangle)).astype(np.int64))
 
     thing = owner[pick]
     face, instance = polygons.face[thing], polygons.instance[thing]
     key = child_key(mix(key_of_seed(triangle[pick]) ^ key[pick]), number)  # several facets of a triangle lie apart
-    corners = meshes.corners(triangle[pick], instance)
+    weights = np.broadcast_to(np.eye(3), (len(pick), 3, 3)).copy()
+    cut = np.flatnonzero(polygons.part[thing] >= 0)
+    weights[cut] = polygons.weights[polygons.part[thing[cut]]]
+    corners = weights @ meshes.corners(triangle[pick], instance)
     root, v = np.sqrt(uniform(key, _PLACE_U)), uniform(key, _PLACE_V)
     at = np.stack([1 - root, root * (1 - v), root * v], axis=1)
     center = np.einsum("nk,nki->ni", at, corners)
@@ -158,8 +163,20 @@ def chosen_facets(polygons: Polygons, optical: Floats, side: Floats) -> Facets:
     return Facets(center, np.cross(along, normal), along, side[thing], *material)
 
 
+def _keys(polygons: Polygons, owner: Integers) -> NDArray[np.uint64]:
+    """Keys (m,) of triangles of polygons by their instance and, for fragments, by their corners."""
+    key = key_of_seed(polygons.instance)
+    cut = np.flatnonzero(polygons.part >= 0)
+    corners = polygons.weights[polygons.part[cut]].reshape(-1, 9) + 0.0  # no negative zeros, which have other bits
+    for bits in np.ascontiguousarray(corners).view(np.uint64).T:
+        key[cut] = mix(key[cut] ^ bits)
+    return key[owner]
+
+
 #: Shapes of attributes by their number of components; a mesh cannot hold others.
 _FLOATS = {1: (), 2: (2,), 3: (3,)}
+#: Part of a face that may be missing through rounding errors alone.
+_WHOLE = 1e-6
 
 
 @dataclass(frozen=True)
@@ -179,7 +196,7 @@ def kept_polygons(result: Refinement) -> Polygons:
     kept = np.flatnonzero(~proxy | np.isinf(held.totals.width))
     rank = np.zeros(len(result.tree), np.int64)
     rank[result.nodes] = result.rank
-    return held.items.take(kept[np.argsort(rank[held.cell[kept]], kind="stable")])
+    return mended(held.items.take(kept[np.argsort(rank[held.cell[kept]], kind="stable")]))
 
 
 def polygon_blocks(polygons: Polygons) -> Iterator[PolygonBlock]:
@@ -193,48 +210,79 @@ def polygon_blocks(polygons: Polygons) -> Iterator[PolygonBlock]:
             yield PolygonBlock(int(s), number, buffers, (number + 1) / len(runs))
 
 
+def mended(polygons: Polygons) -> Polygons:
+    """The same polygons, with a face in place of its first fragment where all of its fragments are there."""
+    cut = np.flatnonzero(polygons.part >= 0)
+    if not len(cut):
+        return polygons
+    meshes = polygons.meshes
+    key = polygons.instance[cut].astype(np.int64) * len(meshes.face_size) + polygons.face[cut]
+    _, first, number = np.unique(key, return_index=True, return_inverse=True)
+    number = number.reshape(-1)
+    there = np.bincount(number, area_fractions(polygons.weights)[polygons.part[cut]])
+    complete = there >= meshes.face_size[polygons.face[cut[first]]] - 2 - _WHOLE
+    part = polygons.part.copy()
+    part[cut[complete[number]]] = -1
+    stays = np.ones(len(polygons), bool)
+    stays[cut[complete[number]]] = False
+    stays[cut[first[complete]]] = True
+    return replace(polygons, part=part).take(stays)
+
+
 def polygon_buffers(polygons: Polygons) -> MeshBuffers:
     """Polygons of one surface as a mesh in world space.
 
-    They share vertices and edges as in the surface, unless they have one twice. Faces of mirrored instances are turned
-    around, as in Blender. Normals, where the surface has any, are the attribute ``custom_normal``.
+    Whole faces share vertices and edges as in the surface, unless they have one twice; fragments are separate. Faces of
+    mirrored instances are turned around, as in Blender. Normals, where the surface has any, are the attribute
+    ``custom_normal``.
     """
     meshes = polygons.meshes
-    corner, instance, size = _face_corners(polygons)
+    cut = polygons.part >= 0
+    whole, pieces = polygons.take(~cut), polygons.take(cut)
+    corner, instance, size = _face_corners(whole)
     # Corners of faces with a vertex twice get vertices of their own, which keeps the mesh valid.
-    own_place = np.repeat(meshes.degenerate[polygons.face], size)
+    own_place = np.repeat(meshes.degenerate[whole.face], size)
     count = len(meshes.positions)
     place = np.where(own_place, count + corner, meshes.corner_verts[corner])
     places = count + len(meshes.corner_verts)
     vertices, corner_verts = np.unique(instance.astype(np.int64) * places + place, return_inverse=True)
-    corner_verts = corner_verts.reshape(-1)
     own, vertex = np.divmod(vertices, max(places, 1))
     loose = vertex >= count
     vertex[loose] = meshes.corner_verts[vertex[loose] - count]
     points = meshes.to_world(meshes.positions[vertex][:, None], own)[:, 0]
     offsets = np.cumsum([0, *size])
-    edges, corner_edges = _edges(corner_verts, offsets, len(vertices))
+    edges, corner_edges = _edges(corner_verts.reshape(-1), offsets, len(vertices))
+
+    turn = np.where(meshes.mirrored[pieces.instance][:, None], [[0, 2, 1]], [[0, 1, 2]])
+    weights = np.take_along_axis(pieces.weights[pieces.part], turn[:, :, None], axis=1)
+    triangle = pieces.triangle[pieces.part]
+    fragments = (weights @ meshes.corners(triangle, pieces.instance)).reshape(-1, 3)
+    every = np.arange(len(fragments))
+    after = every - every % 3 + (every + 1) % 3
 
     surface = int(meshes.surface[polygons.instance[0]])
     shown = meshes.surfaces[surface]
-    within = corner - meshes.first_corner[surface]
+    first = meshes.first_corner[surface]
     attributes: dict[str, tuple[str, NDArray]] = {}
     for name, values in shown.attributes.items():
         if values.shape[1] in _FLOATS:
-            attributes[name] = ("CORNER", values[within].reshape(-1, *_FLOATS[values.shape[1]]).astype(np.float32))
+            both = _at_corners(values, corner - first, meshes.triangles[triangle] - first, weights)
+            attributes[name] = ("CORNER", both.reshape(-1, *_FLOATS[values.shape[1]]).astype(np.float32))
     if shown.normals is not None:
-        normals = np.einsum("ni,nij->nj", shown.normals[within].astype(np.float64), meshes.cofactors[instance])
-        normals *= np.where(meshes.mirrored[instance], -1.0, 1.0)[:, None]
+        normals = _at_corners(shown.normals, corner - first, meshes.triangles[triangle] - first, weights)
+        which = np.concatenate([instance, np.repeat(pieces.instance, 3)])
+        normals = np.einsum("ni,nij->nj", normals, meshes.cofactors[which])
+        normals *= np.where(meshes.mirrored[which], -1.0, 1.0)[:, None]
         normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-300)
         attributes["custom_normal"] = ("CORNER", normals.astype(np.float32))
-    materials = shown.material[polygons.face - meshes.first_face[surface]]
-    attributes["material_index"] = ("FACE", materials.astype(np.int32))
+    faces = np.concatenate([whole.face, pieces.face])
+    attributes["material_index"] = ("FACE", shown.material[faces - meshes.first_face[surface]].astype(np.int32))
     return MeshBuffers(
-        positions=points.astype(np.float32),
-        edge_verts=edges.astype(np.int32),
-        corner_verts=corner_verts.astype(np.int32),
-        corner_edges=corner_edges.astype(np.int32),
-        face_offsets=offsets.astype(np.int32),
+        positions=np.concatenate([points, fragments]).astype(np.float32),
+        edge_verts=np.concatenate([edges, np.stack([every, after], axis=1) + len(points)]).astype(np.int32),
+        corner_verts=np.concatenate([corner_verts.reshape(-1), every + len(points)]).astype(np.int32),
+        corner_edges=np.concatenate([corner_edges, every + len(edges)]).astype(np.int32),
+        face_offsets=np.concatenate([offsets, offsets[-1] + 3 * (1 + np.arange(len(pieces)))]).astype(np.int32),
         attributes=attributes,
         smooth=shown.normals is not None,
     )
@@ -258,3 +306,9 @@ def _edges(corner_verts: NDArray, offsets: NDArray, vertices: int) -> tuple[Inte
     key = np.minimum(corner_verts, after) * max(vertices, 1) + np.maximum(corner_verts, after)
     edges, number = np.unique(key, return_inverse=True)
     return np.stack(np.divmod(edges, max(vertices, 1)), axis=1), number.reshape(-1)
+
+
+def _at_corners(values: NDArray, corner: Integers, triangle: Integers, weights: Floats) -> Floats:
+    """Values at corners of whole faces, then at those of fragments (n, 3, 3) of triangles (n, 3)."""
+    between = (weights @ values[triangle].astype(np.float64)).reshape(-1, values.shape[1])
+    return np.concatenate([values[corner].astype(np.float64), between])

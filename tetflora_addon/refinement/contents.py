@@ -4,14 +4,20 @@
 
 Plants are shared among tetrahedra, see `shared_parts`. Polygons come from meshes that were modeled elsewhere; each is
 in one tetrahedron. Totals are what decisions need: areas, numbers of polygons, and the width of features.
+
+Polygons of divided tetrahedra are handed on to the children. What lies on one side of a plane goes there whole, what
+crosses it is clipped. Nothing smaller than a pixel of the alpha buffer shows in the image: what reaches beyond a plane
+by less than such a *slack* does not cross it.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from typing import Generic, Self, TypeVar
 
 import numpy as np
+from numpy.typing import NDArray
 
-from ..arrays import Arrays, Floats, Integers, Integers32, Mask, column, nested, rows_within
+from ..arrays import Arrays, Chunks, Floats, Integers, Integers32, Mask, chunks, column, nested
 from ..camera.camera import Camera
 from ..compiled.flora import Flora, bounds, extents
 from ..growth.foliage import are_solids, envelope_reach
@@ -20,7 +26,7 @@ from ..growth.seasons import AREA, PRESENT
 from ..growth.seeds import Branches
 from ..subplants.pieces import Pieces, leaf_fraction, piece_leaf_integrals, wood_areas
 from ..tetrahedra.tree import TetrahedralTree
-from .polygons import Polygons
+from .polygons import Polygons, area_fractions
 
 #: Side in pixels from which on a polygon is large: more than facets have, hidden ones included.
 LARGE = 2.0
@@ -187,39 +193,36 @@ class Contents:
     polygons: InCells[Polygons] = field(default_factory=lambda: InCells.none(Polygons))
 
 
-class PolygonsByCell:
-    """Polygons while a tree is divided, each in the terminal node that holds its middle; all in the root at first.
+def in_the_root(polygons: Polygons, large: Mask | bool = False) -> InCells[Polygons]:
+    """Polygons (n,), all in the root; ``large`` ones (n,) stay polygons whatever is decided about their cells."""
+    totals = polygon_totals(polygons)
+    totals = replace(totals, width=np.where(large, np.inf, totals.width))
+    return InCells(polygons, np.zeros(len(polygons), np.int32), totals)
 
-    ``large`` ones (n,) stay polygons whatever is decided about their cells.
-    """
 
-    def __init__(self, polygons: Polygons, large: Mask | bool = False) -> None:
-        totals = polygon_totals(polygons)
-        totals = replace(totals, width=np.where(large, np.inf, totals.width))
-        #: They themselves, each in its node, which changes in place.
-        self.polygons = InCells(polygons, np.zeros(len(polygons), np.int32), totals)
+class PolygonsByCell(Chunks[InCells[Polygons]]):
+    """Polygons in terminal nodes while a tree is divided: only what lies in divided nodes is taken out and copied."""
 
     def __len__(self) -> int:
-        return len(self.polygons)
+        return super().__len__() - self.marked
 
     @property
-    def nbytes(self) -> int:
-        """Bytes of all arrays."""
-        own = self.polygons
-        return own.items.nbytes + own.cell.nbytes + own.totals.nbytes
+    def polygons(self) -> InCells[Polygons]:
+        """All together; copies them into one, which is then kept until something changes."""
+        return self.joined()
 
-    def update(self, tree: TetrahedralTree, dividing: Mask, _edge: Floats) -> Mask:
-        """Hand polygons in divided nodes on; parameters and result as of `SharedParts.update`."""
-        cell, center = self.polygons.cell, self.polygons.items.center
-        inside, changed = rows_within(dividing, cell), dividing.copy()
-        cell[inside] = lower = tree.descend(cell, center, inside)
-        changed[lower] = True
-        return changed
+    def totals(self, chosen: Mask) -> list[tuple[Totals, Integers32]]:
+        """Totals of polygons in chosen nodes, a mask (nodes,), and their nodes; one pair for each chunk."""
+        some = [chunk.take(chosen[chunk.cell] & there) for chunk, there in self.chunks()]
+        return [(part.totals, part.cell) for part in some]
 
-    def totals(self, chosen: Mask) -> tuple[Totals, Integers32]:
-        """Totals (k,) of polygons in chosen nodes, a mask (nodes,), and their nodes (k,)."""
-        some = rows_within(chosen, self.polygons.cell)
-        return self.polygons.totals.take(some), self.polygons.cell[some]
+    def take_within(self, chosen: Mask) -> InCells[Polygons]:
+        """Remove and return what lies in chosen nodes; ``chosen`` is (nodes,) bool."""
+        within = [chosen[chunk.cell] & there for chunk, there in self.chunks()]
+        out = self.take_out(np.flatnonzero(np.concatenate(within)))
+        if self.marked > len(self):  # copying what stays each time would cost more than all else that moves
+            self.joined()
+        return out
 
 
 def large_polygons(polygons: Polygons, camera: Camera) -> Mask:
@@ -254,3 +257,99 @@ def bounding_box(flora: Flora, subplants: Branches) -> Floats:
     axis = np.abs(capsules[3:6])
     reach = capsules[7] * axis + capsules[6] * np.sqrt(np.maximum(1 - axis**2, 0)) + capsules[8]
     return np.stack([(capsules[:3] - reach).min(axis=1), (capsules[:3] + reach).max(axis=1)])
+
+
+#: Meters (n,) at points (n, 3) that make no difference in the image.
+Slack = Callable[[Floats], Floats]
+
+#: Triangles of polygons that are lowered at a time; bounds what that takes to some hundred megabytes.
+DESCEND_BATCH = 200_000
+
+
+def cut(polygons: Polygons, planes: Floats, slack: Floats | float = 0.0) -> tuple[Integers, Integers, Polygons]:
+    """Clip polygons (n,) by a plane (n, 4) each.
+
+    Triangles that reach beyond their plane by no more than ``slack`` (n,), in meters, stay whole.
+
+    Returns
+    -------
+    owner : (k,) int64
+        Polygon that each fragment comes from.
+    side : (k,) int64
+        0 where the distance is negative, 1 elsewhere.
+    fragments : Polygons of k
+        A triangle that crosses leaves one fragment on one side and two on the other.
+    """
+    owner, whole = polygons.as_fragments()
+    distance = whole.corner_distances(planes[owner])
+    low, high = distance.min(axis=1, initial=np.inf), distance.max(axis=1, initial=-np.inf)
+    loose = np.broadcast_to(slack, len(polygons))[owner]
+    crosses = np.minimum(-low, high) > np.maximum(loose, whole.touching())
+    stays, some = np.flatnonzero(~crosses), np.flatnonzero(crosses)
+    positive = distance[some] >= 0
+    # The corner that is alone on its side comes first.
+    alone = np.where(positive.sum(axis=1) == 1, positive.argmax(axis=1), positive.argmin(axis=1))
+    turn = (alone[:, None] + np.arange(3)) % 3
+    w = np.take_along_axis(whole.weights[some], turn[:, :, None], axis=1)
+    d = np.take_along_axis(distance[some], turn, axis=1)
+    first, second = (
+        w[:, 0] + (w[:, k] - w[:, 0]) * np.clip(d[:, :1] / (d[:, :1] - d[:, k : k + 1]), 0.0, 1.0) for k in (1, 2)
+    )
+    made = np.concatenate(
+        [
+            np.stack([w[:, 0], first, second], axis=1),
+            np.stack([first, w[:, 1], w[:, 2]], axis=1),
+            np.stack([first, w[:, 2], second], axis=1),
+        ]
+    )
+    sides = (d[:, 0] >= 0).astype(np.int64)
+    from_, side = np.tile(some, 3), np.concatenate([sides, 1 - sides, 1 - sides])
+    kept = np.flatnonzero(area_fractions(made) > 0)  # a cut through a corner leaves pieces of no size
+    made, from_, side = made[kept], from_[kept], side[kept]
+    new = Polygons.fragments(polygons.meshes, whole.face[from_], whole.instance[from_], whole.triangle[from_], made)
+    larger = (high[stays] >= -low[stays]).astype(np.int64)
+    parts = Polygons.concatenate([whole.take(stays), new])
+    return np.concatenate([owner[stays], owner[from_]]), np.concatenate([larger, side]), parts
+
+
+def sort_into_children(tree: TetrahedralTree, held: InCells[Polygons], slack: Slack) -> InCells[Polygons]:
+    """Hand polygons of divided nodes on until all lie in terminal ones.
+
+    What reaches no further than ``slack`` beyond a plane stays whole. Nothing is lost or held twice.
+    """
+    placed = [InCells.none(Polygons)]
+    while len(held):
+        polygons, cells, crosses = held.items, held.cell.copy(), np.zeros(len(held), bool)
+        for some in chunks(polygons.triangle_counts, DESCEND_BATCH):
+            cells[some], crosses[some] = _lowered(tree, polygons.take(some), cells[some], slack)
+        placed.append(replace(held, cell=cells).take(~crosses))
+        polygons, cells, width = polygons.take(crosses), cells[crosses], held.totals.width[crosses]
+        owner, side, polygons = cut(polygons, tree.planes(cells), slack(polygons.center))
+        held = InCells(polygons, tree.children[cells[owner], side], polygon_totals(polygons, width[owner]))
+    return InCells.concatenate(placed)
+
+
+def _lowered(tree: TetrahedralTree, polygons: Polygons, cells: NDArray, slack: Slack) -> tuple[Integers32, Mask]:
+    """Nodes (n,) that polygons come down to whole, and whether they cross the planes of these."""
+    cells, crosses = cells.copy(), np.zeros(len(polygons), bool)
+    center, reach, touching = polygons.center, polygons.reach, polygons.touching()
+    moving = np.flatnonzero(tree.children[cells, 0] >= 0)
+    while len(moving):
+        planes = tree.planes(cells[moving])
+        distance = np.einsum("ni,ni->n", np.take(center, moving, axis=0), planes[:, :3]) + planes[:, 3]
+        whole = np.abs(distance) > np.take(reach, moving)
+        # The sphere is a first guess; slack and corners are computed only for what it leaves open.
+        unclear = np.flatnonzero(~whole)
+        some = moving[unclear]
+        loose = np.maximum(touching[some], slack(center[some]))
+        whole[unclear] = np.abs(distance[unclear]) > reach[some] - loose
+        left = np.flatnonzero(~whole[unclear])
+        if len(left):
+            low, high = polygons.take(some[left]).distances(planes[unclear[left]])
+            whole[unclear[left]] = np.minimum(-low, high) <= loose[left]
+            distance[unclear[left]] = high + low  # the larger part says where it goes
+        crosses[moving[~whole]] = True
+        moving, side = moving[whole], (distance[whole] >= 0).astype(np.int64)
+        cells[moving] = at = tree.children[cells[moving], side]
+        moving = moving[tree.children[at, 0] >= 0]
+    return cells, crosses

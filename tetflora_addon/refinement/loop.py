@@ -29,9 +29,12 @@ from .contents import (
     Contents,
     PlantParts,
     PolygonsByCell,
+    Slack,
     Totals,
     bounding_box,
+    in_the_root,
     large_polygons,
+    sort_into_children,
     sums,
 )
 from .decisions import Decision, Terminals, decide, gains_nothing, without_splits
@@ -39,7 +42,7 @@ from .lights import Light, decide_by_shadows, seen_ground, shadows_of
 from .polygons import Polygons
 from .settings import RefinementSettings
 from .shared_parts import PlacedAssets, SharedAssets, SharedParts, SharedPlants
-from .visibility import AlphaBuffer, Buffers, is_anchored, widened_for
+from .visibility import AlphaBuffer, Buffers, is_anchored, pixels_of_buffer, widened_for
 
 #: How much coarser than asked for facets are before somebody is told.
 COARSER = 1.5
@@ -224,6 +227,11 @@ def _around_instances(polygons: Polygons) -> tuple[Floats, Floats]:
 
 #: Bisections between two visibility steps; three together divide a tetrahedron into eight parts.
 GENERATIONS = 3
+#: Pixels of the image by which things may always reach beyond a plane; smaller sub-plants stay whole.
+SLACK = 2.0
+#: Fragments of polygons, beside two for each polygon, from which on none are cut any more: each goes where most of it
+#: is. Large faces that cross each other's space a thousand times would fill all memory.
+MOST_FRAGMENTS = 200_000
 #: Blocks are so many times as large where no plant has leaves: what is seen through hides little that is worth finding.
 BARE_BLOCK = 1.5
 #: Weight of the pixels of what is divided for its shadow: as often as possible, where it is in view.
@@ -326,11 +334,14 @@ def refine(
     plants, assets = SharedPlants(flora, seeds, camera, filled), SharedAssets(placed, camera, filled)
     settings = _on_day(settings, flora, plants.parts.branches)
     camera = widened_for(camera, settings.margin, flora, plants.parts.branches, polygons, assets.parts)
-    cell_polygons = PolygonsByCell(polygons, large_polygons(polygons, camera))
+    slack = _slack(camera, settings.visibility_resolution)
+    own = in_the_root(polygons, large_polygons(polygons, camera))
     bounds = _bounds(flora, plants, assets, polygons)
     tree = world_root(bounds, camera.origin) if is_anchored(camera, settings) else view_root(camera, bounds)
-    divided, kinds = np.arange(len(tree)) == 0, (plants, assets, cell_polygons)
-    for kind in kinds:
+    cell_polygons, most = PolygonsByCell(sort_into_children(tree, own, slack)), MOST_FRAGMENTS + 2 * len(own)
+    divided = np.arange(len(tree)) == 0
+    shared = plants, assets
+    for kind in shared:
         kind.update(tree, divided, np.where(divided, np.inf, 0.0))
     clock.lap("update")
     shadowed = bool(lights) and settings.shadow_cutoff > 0.0
@@ -338,7 +349,7 @@ def refine(
     buffers = Buffers(camera, settings.visibility_resolution, occluders)
     # Generations count from the root's own pieces. Passes do not count: a late one may divide what is still coarse.
     deepest = tree.levels - 1 + settings.max_levels
-    cells, buffer = _drawn(tree, buffers, None, None, *_filled(tree, kinds, np.ones(len(tree), bool)))
+    cells, buffer = _drawn(tree, buffers, None, None, *_filled(tree, shared, cell_polygons, np.ones(len(tree), bool)))
     clock.lap("visibility")
     passes = 0
     while True:
@@ -381,11 +392,17 @@ def refine(
         dividing, edge = np.zeros(len(tree), bool), np.zeros(len(tree))
         dividing[parents] = True
         edge[parents] = np.sqrt(squared_edges(tree.vertices(parents)).max(axis=1))
-        changed = np.logical_or.reduce([kind.update(tree, dividing, edge) for kind in kinds])
+        may_cut = len(cell_polygons) <= most
+        new = sort_into_children(
+            tree, cell_polygons.take_within(dividing), slack if may_cut else lambda at: np.full(len(at), np.inf)
+        )
+        cell_polygons.append(new)
+        changed = plants.update(tree, dividing, edge) | assets.update(tree, dividing, edge)
+        changed[new.cell] = True
         clock.lap("update")
         buffer.remove(changed)
         kept = cells.take(np.flatnonzero(~changed[cells.nodes]))
-        cells, buffer = _drawn(tree, buffers, buffer, kept, *_filled(tree, kinds, changed))
+        cells, buffer = _drawn(tree, buffers, buffer, kept, *_filled(tree, shared, cell_polygons, changed))
         clock.lap("visibility")
 
 
@@ -404,10 +421,10 @@ def _bounds(flora: Flora, plants: SharedPlants, assets: SharedAssets, polygons: 
 
 
 def _filled(
-    tree: TetrahedralTree, kinds: Sequence[SharedParts | PolygonsByCell], changed: Mask
+    tree: TetrahedralTree, shared: Sequence[SharedParts], cell_polygons: PolygonsByCell, changed: Mask
 ) -> tuple[Integers, Totals]:
     """Nodes (n,) whose contents have changed and that hold something, and their totals."""
-    found = [kind.totals(changed) for kind in kinds]
+    found = [*(kind.totals(changed) for kind in shared), *cell_polygons.totals(changed)]
     every = sums(Totals.concatenate([t for t, _ in found]), np.concatenate([c for _, c in found]), len(tree))
     nodes = np.flatnonzero(every.area > 0)
     return nodes, every.take(nodes)
@@ -429,6 +446,16 @@ def _drawn(
         totals, cells = Totals.concatenate([cells.totals, totals]), None
     new = Terminals.seen(tree, nodes, totals, buffers.camera, finer)
     return (Terminals.concatenate([cells, new]) if cells is not None else new), finer
+
+
+def _slack(camera: Camera, resolution: int) -> Slack:
+    """A pixel of the alpha buffer, in meters: nothing smaller changes decisions."""
+    pixels = max(pixels_of_buffer(camera, resolution), SLACK)
+
+    def slack(points: Floats) -> Floats:
+        return pixels * camera.extent_around(points)
+
+    return slack
 
 
 def _on_day(settings: RefinementSettings, flora: Flora, plants: Branches) -> RefinementSettings:

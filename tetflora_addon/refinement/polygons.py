@@ -1,16 +1,16 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Explicit polygons (paper, sections 5 and 6.1): faces of meshes that were modeled elsewhere.
+"""Explicit polygons (paper, sections 5 and 6.1): faces of meshes that were modeled elsewhere, and their fragments.
 
-Nothing is copied when polygons move from tetrahedron to tetrahedron: a face is two numbers, its own and the instance of
-its mesh. It goes whole to the tetrahedron that holds its middle. The paper clips what crosses a plane; but faces that
-are drawn as such are drawn whole, and what stands for others takes its places from these, so that tetrahedra only have
-to know about how much is where.
+Nothing is copied when polygons move from tetrahedron to tetrahedron. A whole face is two numbers, the face and the
+instance of its mesh. A fragment, clipped off by a plane, is a triangle in the barycentric coordinates of one of the
+triangles of its face. Positions, texture coordinates and all other attributes of its corners follow from these; the
+fragments of a face add up to it whatever the sequence of cuts.
 """
 
 from collections.abc import Mapping, Sequence
 from copy import copy
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Self
 
@@ -24,6 +24,8 @@ from ..parallel import blocks
 MEASURE_BATCH = 200_000
 #: Meters, and factors, from which on squares of areas need not be numbers any more.
 _FARTHEST = 1e12
+#: A fragment that reaches beyond a plane by less than this fraction of its size is not cut again by rounding errors.
+_TOUCHING = 1e-9
 
 
 @dataclass(frozen=True)
@@ -180,53 +182,148 @@ class Meshes:
 
 @dataclass(frozen=True)
 class Polygons(Arrays):
-    """Faces of instances (n)."""
+    """Whole faces and fragments of faces, n in all, m of them fragments."""
 
     meshes: Meshes  # what the numbers below count through
     face: Integers32  # (n,)
     instance: Integers32  # (n,)
+    part: Integers32  # (n,): row of the two arrays below, −1 for whole faces
+    triangle: Integers32  # (m,)
+    weights: Floats  # (m, 3, 3): barycentric coordinates in the triangle, for each corner of the fragment a row
     center: Floats  # (n, 3): somewhere within, meters, world space
     reach: Floats  # (n,): distance from there within which all of it lies, meters
 
     @classmethod
     def everything(cls, meshes: Meshes) -> Self:
-        """All faces of all instances."""
+        """All faces of all instances, whole."""
         instance, face = spread(np.diff(meshes.first_face)[meshes.surface])
         face += meshes.first_face[meshes.surface][instance]
         center = np.zeros((len(face), 3))
         for some in blocks(len(face), MEASURE_BATCH):
             center[some] = meshes.to_world(meshes.centers[face[some], None], instance[some])[:, 0]
         reach = meshes.radii[face] * meshes.largest[instance]
-        return cls(meshes, face.astype(np.int32), instance.astype(np.int32), center, reach)
+        whole = np.full(len(face), -1, np.int32)
+        none = np.zeros(0, np.int32), np.zeros((0, 3, 3))
+        return cls(meshes, face.astype(np.int32), instance.astype(np.int32), whole, *none, center, reach)
 
     @classmethod
     def empty(cls) -> Self:
         """None at all."""
         return cls.everything(_NOTHING)
 
+    @classmethod
+    def fragments(cls, meshes: Meshes, face: NDArray, instance: NDArray, triangle: NDArray, weights: NDArray) -> Self:
+        """Fragments (n,) of faces, given by a triangle (n,) each and weights (n, 3, 3) in it."""
+        corners = weights @ meshes.corners(triangle, instance)
+        center = corners.mean(axis=1)
+        reach = np.linalg.norm(corners - center[:, None], axis=2).max(axis=1, initial=0.0)
+        part = np.arange(len(face), dtype=np.int32)
+        numbers = (np.asarray(a, np.int32) for a in (face, instance, part, triangle))
+        return cls(meshes, *numbers, weights, center, reach)
+
+    def take(self, index: NDArray | slice) -> Self:
+        """Rows by indices (k,), mask (n,) or slice; fragments go with the faces that refer to them."""
+        part = self.part[index]
+        cut = np.flatnonzero(part >= 0)
+        rows = part[cut]
+        part = np.full(len(part), -1, np.int32)
+        part[cut] = np.arange(len(cut), dtype=np.int32)
+        some = (a[index] for a in (self.face, self.instance))
+        more = (a[rows] for a in (self.triangle, self.weights))
+        return Polygons(self.meshes, *some, part, *more, self.center[index], self.reach[index])
+
+    @classmethod
+    def concatenate(cls, parts: Sequence[Self]) -> Self:
+        """All of several in one; they refer to the same meshes."""
+        parts = [p for p in parts if len(p)] or [cls.empty()]
+        if len(parts) == 1:
+            return parts[0]
+        first = np.cumsum([0] + [len(p.triangle) for p in parts[:-1]])
+        shifted = [np.where(p.part < 0, p.part, p.part + n) for p, n in zip(parts, first, strict=True)]
+        own = {
+            name: np.concatenate([getattr(p, name) for p in parts])
+            for name in ("face", "instance", "triangle", "weights", "center", "reach")
+        }
+        return replace(parts[0], part=np.concatenate(shifted).astype(np.int32), **own)
+
     @property
     def triangle_counts(self) -> Integers:
-        """Triangles (n,) that each consists of."""
-        return self.meshes.face_size[self.face] - 2
+        """Triangles (n,) that each consists of: 1 for a fragment."""
+        return np.where(self.part >= 0, 1, self.meshes.face_size[self.face] - 2)
 
-    def triangles(self) -> tuple[Integers, Integers]:
-        """The polygon (k,) that each of their triangles belongs to, in order, and these triangles (k,)."""
+    def triangles(self) -> tuple[Integers, Integers, Floats]:
+        """Triangles of whole faces, and fragments, in the order of the polygons.
+
+        Returns
+        -------
+        owner : (k,) int64
+            Polygon that each belongs to.
+        triangle : (k,) int64
+        fraction : (k,) float64
+            Of the triangle's area; 1 except for fragments.
+        """
+        cut = self.part >= 0
         owner, index = spread(self.triangle_counts)
-        return owner, self.meshes.face_triangle[self.face][owner] + index
+        triangle, fraction = self.meshes.face_triangle[self.face][owner] + index, np.ones(len(owner))
+        own = np.flatnonzero(cut[owner])
+        rows = self.part[owner[own]]
+        triangle[own], fraction[own] = self.triangle[rows], area_fractions(self.weights)[rows]
+        return owner, triangle, fraction
+
+    def as_fragments(self) -> tuple[Integers, Self]:
+        """The polygon (k,) that each fragment comes from, and fragments; whole faces become their triangles."""
+        owner, triangle, _ = self.triangles()
+        weights = np.broadcast_to(np.eye(3), (len(owner), 3, 3)).copy()
+        own = np.flatnonzero(self.part[owner] >= 0)
+        weights[own] = self.weights[self.part[owner[own]]]
+        return owner, Polygons.fragments(self.meshes, self.face[owner], self.instance[owner], triangle, weights)
 
     def areas(self) -> Floats:
         """Areas (n,), m²."""
         areas = np.zeros(len(self))
         for run in chunks(self.triangle_counts, MEASURE_BATCH):
             some = self.take(run)
-            owner, triangle = some.triangles()
+            owner, triangle, fraction = some.triangles()
             own = np.linalg.norm(self.meshes.vectors(triangle, some.instance[owner]), axis=1)
-            areas[run] = np.bincount(owner, own, len(some))
+            areas[run] = np.bincount(owner, fraction * own, len(some))
         return areas
 
     def bounding_box(self) -> Floats:
         """Axis-aligned box (2, 3) around all of them, at least one, meters."""
         return np.stack([(self.center.T - self.reach).min(axis=1), (self.center.T + self.reach).max(axis=1)])
+
+    def distances(self, planes: Floats) -> tuple[Floats, Floats]:
+        """Least and greatest signed distances (n,) of the corners from planes (n, 4), meters."""
+        low, high = np.zeros((2, len(self)))
+        whole, cut = np.flatnonzero(self.part < 0), np.flatnonzero(self.part >= 0)
+        if len(whole):
+            meshes, face = self.meshes, self.face[whole]
+            owner, index = spread(meshes.face_size[face])
+            points = meshes.positions[meshes.corner_verts[meshes.face_start[face][owner] + index]]
+            points = meshes.to_world(points[:, None], self.instance[whole][owner])[:, 0]
+            plane = planes[whole][owner]
+            distance = np.einsum("ni,ni->n", points, plane[:, :3]) + plane[:, 3]
+            first = np.flatnonzero(index == 0)
+            low[whole], high[whole] = np.minimum.reduceat(distance, first), np.maximum.reduceat(distance, first)
+        if len(cut):
+            distance = self.take(cut).corner_distances(planes[cut])
+            low[cut], high[cut] = distance.min(axis=1), distance.max(axis=1)
+        return low, high
+
+    def corner_distances(self, planes: Floats) -> Floats:
+        """Signed distances (n, 3) of the corners of fragments from planes (n, 4), meters."""
+        corners = self.weights[self.part] @ self.meshes.corners(self.triangle[self.part], self.instance)
+        return np.einsum("nki,ni->nk", corners, planes[:, :3]) + planes[:, 3:]
+
+    def touching(self) -> Floats:
+        """Meters (n,) within which rounding errors may carry a corner across a plane."""
+        return _TOUCHING * self.reach
+
+
+def area_fractions(weights: Floats) -> Floats:
+    """Fraction (n,) of its triangle's area that a fragment with weights (n, 3, 3) takes."""
+    a, b = weights[:, 1, 1:] - weights[:, 0, 1:], weights[:, 2, 1:] - weights[:, 0, 1:]
+    return np.abs(a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0])
 
 
 _NOTHING = Meshes((), np.zeros(0, np.int32), np.zeros((0, 4, 4)))

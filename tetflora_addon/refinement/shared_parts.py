@@ -43,12 +43,15 @@ from ..growth.foliage import are_solids, leaf_keys, leaf_sites, leaf_start
 from ..growth.growth import open_branches, radius_at, trunks
 from ..growth.hashing import child_key, uniform
 from ..growth.seeds import Branches, Seeds
+from ..parallel import blocks, each_on_all_cores
 from ..subplants.pieces import Pieces
 from ..tetrahedra.tree import TetrahedralTree
 from .contents import InCells, PlantParts, Totals, as_pieces, sums
 
 #: Parts larger than this many times the longest edge of a tetrahedron that is divided are opened.
 LARGE = 1.6
+#: Points that are lowered at a time; bounds what that takes.
+DESCEND_BATCH = 200_000
 #: Parts that have been opened are dropped once they are more than one in so many.
 _OPENED = 3
 
@@ -70,6 +73,32 @@ class SharePoints(Arrays):
     def optical_area(self) -> Floats32:
         """Area (m,) that can block light, m²."""
         return self.leaf + self.wood / 2
+
+
+def descend(tree: TetrahedralTree, points: SharePoints, some: Integers | None = None) -> Integers32:
+    """Terminal nodes (m,) that points are in, below those that they are known to be in.
+
+    some: indices (k,) of points, by default all, of which alone they are wanted (k,).
+    """
+    cell, children = points.cell if some is None else points.cell[some], tree.children.reshape(-1)
+    every = np.flatnonzero(np.take(children, 2 * cell) >= 0)
+    cell = cell.copy()
+
+    def lower(block: slice) -> None:
+        moving = every[block]
+        place = np.take(points.position, moving if some is None else some[moving], axis=0).astype(np.float64)
+        while len(moving):
+            at = np.take(cell, moving)
+            plane = tree.planes(at)
+            side = plane[:, 3] + np.einsum("ni,ni->n", plane[:, :3], place) >= 0.0
+            at = np.take(children, 2 * at + side)
+            cell[moving] = at
+            left = np.flatnonzero(np.take(children, 2 * at) >= 0)
+            if len(left) < len(moving):
+                moving, place = moving[left], np.take(place, left, axis=0)
+
+    each_on_all_cores(lower, blocks(len(every), DESCEND_BATCH))
+    return cell
 
 
 @dataclass(frozen=True)
@@ -169,7 +198,7 @@ class SharedParts(Generic[Parts]):
         part = np.take(points.part, inside)
         large = np.take(self._figures.rows.reach, part) > LARGE * np.take(edge, np.take(points.cell, inside))
         # Handed on in place: millions of points that stay where they are are not looked at.
-        points.cell[inside] = cell = tree.descend(points.cell, points.position, inside)
+        points.cell[inside] = cell = descend(tree, points, inside)
         changed[cell] = True
         if large.any():
             opening = np.zeros(len(self._parts), bool)
@@ -188,7 +217,7 @@ class SharedParts(Generic[Parts]):
             count += len(new)
         new_parts, new_points = self._parts.kind.concatenate(parts), SharePoints.concatenate(points)
         if tree is not None:
-            new_points = replace(new_points, cell=tree.descend(new_points.cell, new_points.position))
+            new_points = replace(new_points, cell=descend(tree, new_points))
         left = np.take(self._points.rows.cell, gone)
         self._points.exchange(gone, new_points)
         self._parts.append(new_parts)

@@ -350,3 +350,10 @@ def widened_for(
 def is_anchored(camera: Camera, settings: RefinementSettings) -> bool:
     """Whether the root stays where it is in the world; a panorama has no pyramid that a root could begin with."""
     return settings.anchored or camera.kind == "PANO"
+
+
+def pixels_of_buffer(camera: Camera, resolution: int) -> float:
+    """Side of a pixel of the finest alpha buffer, in pixels of the final image."""
+    if camera.kind == "PANO":
+        return 2.0 / face_side(resolution) / camera.pixel_size
+    return camera.width / buffer_size(camera, resolution)[0]

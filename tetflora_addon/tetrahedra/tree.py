@@ -20,7 +20,6 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..arrays import Floats, Integers, Integers32, Mask
-from ..parallel import blocks, each_on_all_cores
 from .geometry import EDGES, plane_distance, plane_through, quality, signed_volume, squared_edges
 
 #: Squared lengths that differ by less than this fraction count as equal, so that the choice of the edge does not depend
@@ -447,46 +446,27 @@ class TetrahedralTree:
             Node numbers. A point on a plane belongs to side 1.
         """
         points = np.asarray(points, np.float64).reshape(-1, 3)
-        return self.descend(np.zeros(len(points), np.int32), points)
-
-    def descend(self, node: Integers32, points: NDArray[np.floating], some: Integers | None = None) -> Integers32:
-        """Terminal nodes that hold points, below those that are known to.
-
-        Parameters
-        ----------
-        node : (n,) int32
-            Node that holds each point.
-        points : (n, 3) float
-            Meters, world space.
-        some : (k,) int, optional
-            Indices of points, by default all, of which alone nodes are wanted.
-
-        Returns
-        -------
-        (k,) int32
-        """
-        node, children = node.copy() if some is None else node[some], self.children.reshape(-1)
-        every = np.flatnonzero(np.take(children, 2 * node) >= 0)
-
-        def lower(block: slice) -> None:
-            moving = every[block]
-            place = np.take(points, moving if some is None else some[moving], axis=0).astype(np.float64)
-            while len(moving):
-                at = np.take(node, moving)
-                at = np.take(children, 2 * at + (plane_distance(self.planes(at), place) >= 0.0))
-                node[moving] = at
-                left = np.flatnonzero(np.take(children, 2 * at) >= 0)
-                if len(left) < len(moving):
-                    moving, place = moving[left], np.take(place, left, axis=0)
-
-        each_on_all_cores(lower, blocks(len(every), POINT_BATCH))
-        return node
+        found = np.zeros(len(points), np.int32)
+        for start in range(0, len(points), POINT_BATCH):
+            part = slice(start, start + POINT_BATCH)
+            found[part] = self._descend(points[part])
+        return found
 
     def _tetrahedra(self, nodes: Integers) -> Floats:
         vertices = self.vertices(nodes)
         if np.isnan(vertices[:, 0, 0]).any():
             raise ValueError("only nodes with a tetrahedron can be bisected; split regions by a plane instead")
         return vertices
+
+    def _descend(self, points: Floats) -> Integers32:
+        node = np.zeros(len(points), np.int32)
+        moving = np.arange(len(points) if self.children[0, 0] >= 0 else 0)
+        while len(moving):
+            at = node[moving]
+            side = plane_distance(self.planes(at), points[moving]) >= 0.0
+            node[moving] = at = self.children[at, side.astype(np.intp)]
+            moving = moving[self.children[at, 0] >= 0]
+        return node
 
     def _levels_of_inner(self) -> list[Integers]:
         """Inner nodes of each level that has some, from the root down; kept until the tree grows."""

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tests.engine.refinement.test_polygons import SEEDS, grove, placed, thicket
+from tests.engine.refinement.test_polygons import SEEDS, divided, grove, placed, thicket
 from tetflora_addon.emission.polygons import chosen_facets
 from tetflora_addon.refinement.polygons import Polygons
 
@@ -18,7 +18,8 @@ from tetflora_addon.refinement.polygons import Polygons
 @settings(deadline=None, max_examples=12)
 def test_facets_do_not_depend_on_what_else_is_held(seed: int, side: float) -> None:
     """Without one of many polygons, in any order, all others have the facets that they had; all lie on their faces."""
-    polygons = Polygons.everything(placed(thicket(seed, 30), seed))
+    _, held = divided(Polygons.everything(placed(thicket(seed, 30), seed)), seed, 0.0)
+    polygons = held.items
     rng = np.random.default_rng(seed)
     optical, sides = polygons.areas(), np.full(len(polygons), side)
 
@@ -27,11 +28,7 @@ def test_facets_do_not_depend_on_what_else_is_held(seed: int, side: float) -> No
         return set(map(tuple, np.concatenate([made.center, made.along], axis=1).round(9)))
 
     every, gone = rng.permutation(len(polygons)), rng.integers(len(polygons))
-    whole, rest, alone = (
-        facets_of(every),
-        facets_of(np.delete(np.arange(len(polygons)), gone)),
-        facets_of(np.array([gone])),
-    )
+    whole, rest, alone = facets_of(every), facets_of(np.delete(np.arange(len(polygons)), gone)), facets_of([gone])
     assert rest | alone == whole
     number = optical.sum() / side**2
     assert len(whole) == pytest.approx(number, abs=1 + 5 * np.sqrt(number))

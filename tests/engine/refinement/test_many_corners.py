@@ -11,6 +11,7 @@ from tests.engine import support
 from tests.engine.refinement.test_polygons import refined, surface
 from tetflora_addon.emission import polygons as emitted
 from tetflora_addon.emission.polygons import kept_polygons, polygon_blocks
+from tetflora_addon.refinement import loop
 from tetflora_addon.refinement.polygons import Meshes, Polygons
 
 
@@ -28,11 +29,17 @@ def test_blocks_of_faces_with_many_corners_are_no_larger_than_others(monkeypatch
     assert max(len(b.buffers.corner_verts) for b in blocks) <= 4 * limit + corners
 
 
-def test_faces_that_cross_each_other_everywhere_stay_as_many() -> None:
-    """Each goes whole to where its middle is; nothing is lost."""
+def test_faces_that_cross_each_other_everywhere_are_not_cut_without_end(monkeypatch: pytest.MonkeyPatch) -> None:
+    """From a number of fragments on they go whole to where most of them is; nothing is lost."""
     rng = np.random.default_rng(4)
     faces = [rng.choice(60, 20, replace=False).tolist() for _ in range(60)]
     meshes = Meshes([surface(rng.uniform(-2, 2, (60, 3)), faces)], np.zeros(1, int), np.eye(4)[None])
-    found = refined(meshes, support.camera((0, -6, 0), (0, 60, 0), 160, 1.0))
-    assert len(found.cell_polygons) == 60
-    assert 0 < sum(b.buffers.polygons for b in polygon_blocks(kept_polygons(found))) <= 60
+    camera = support.camera((0, -6, 0), (0, 60, 0), 160, 1.0)
+    free = refined(meshes, camera)
+    monkeypatch.setattr(loop, "MOST_FRAGMENTS", 5_000)
+    bound = refined(meshes, camera)
+    assert len(free.cell_polygons) > 40_000
+    assert len(bound.cell_polygons) < 20_000
+    whole = Polygons.everything(meshes).areas().sum()
+    assert bound.cell_polygons.polygons.items.areas().sum() == pytest.approx(whole, rel=1e-9)
+    assert sum(len(b.buffers.corner_verts) for b in polygon_blocks(kept_polygons(bound))) > 0

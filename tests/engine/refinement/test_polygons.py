@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Explicit polygons: each is in one tetrahedron as a whole, and drawn as it was."""
+"""Explicit polygons: whatever cuts them, area, colors, directions and texture coordinates stay what they were."""
 
 from __future__ import annotations
 
@@ -16,16 +16,16 @@ from tests.engine.subplants.test_leaf_meshes import check_topology
 from tetflora_addon.assets.patches import mesh_features
 from tetflora_addon.buffers import MeshBuffers
 from tetflora_addon.emission.budget import fit_to_budget
-from tetflora_addon.emission.polygons import PolygonBlock, kept_polygons, polygon_blocks, polygon_buffers
+from tetflora_addon.emission.polygons import PolygonBlock, kept_polygons, mended, polygon_blocks, polygon_buffers
 from tetflora_addon.emission.shells import proxy_shells
 from tetflora_addon.growth.seeds import Branches
 from tetflora_addon.proxies.microsurfaces import Facets
 from tetflora_addon.proxies.summaries import summarize
-from tetflora_addon.refinement.contents import Contents, PolygonsByCell
+from tetflora_addon.refinement.contents import Contents, InCells, cut, in_the_root, sort_into_children
 from tetflora_addon.refinement.contents import sums as sums_by_node
 from tetflora_addon.refinement.decisions import Decision
 from tetflora_addon.refinement.loop import Refinement, refine
-from tetflora_addon.refinement.polygons import Meshes, Polygons, Surface
+from tetflora_addon.refinement.polygons import Meshes, Polygons, Surface, area_fractions
 from tetflora_addon.refinement.settings import RefinementSettings
 from tetflora_addon.refinement.shared_parts import AssetParts
 from tetflora_addon.refinement.visibility import widened_for
@@ -89,62 +89,107 @@ def placed(one: Surface, seed: int, number: int = 3) -> Meshes:
     return Meshes([one], np.zeros(number, int), matrices)
 
 
-def divided(polygons: Polygons, seed: int, rounds: int = 4) -> tuple[TetrahedralTree, PolygonsByCell]:
+def sums(polygons: Polygons) -> np.ndarray:
+    """Area, color, transmission, orientation moment, all as sums."""
+    nothing = np.zeros(1, np.int64)
+    summary = summarize(support.small_flora(), Contents(polygons=in_the_root(polygons)), nothing, 1)
+    return np.concatenate([[1], summary.color[0], summary.transmission, summary.moment.ravel()]) * summary.optical_area
+
+
+def divided(polygons: Polygons, seed: int, slack: float, rounds: int = 4) -> tuple[TetrahedralTree, InCells]:
     """Polygons in a tree that a camera roots and random choices divide."""
     rng = np.random.default_rng(seed)
     camera = support.camera(rng.uniform(-9, 9, 3), rng.uniform(-3, 3, 3))
-    tree, held = view_root(camera, polygons.bounding_box()), PolygonsByCell(polygons)
-    divide(tree, held, np.zeros(1, int))
+    tree = view_root(camera, polygons.bounding_box())
+
+    def loose(points: np.ndarray) -> np.ndarray:
+        return np.full(len(points), slack)
+
+    held = sort_into_children(tree, in_the_root(polygons), loose)
     for _ in range(rounds):
-        nodes = np.unique(held.polygons.cell)
-        nodes = parents = nodes[rng.random(len(nodes)) < 0.7]
+        nodes = np.unique(held.cell)
+        nodes = nodes[rng.random(len(nodes)) < 0.7]
         for _ in range(2):
             nodes = tree.split(nodes).ravel()
-        divide(tree, held, parents)
+        held = sort_into_children(tree, held, loose)
     return tree, held
 
 
-def divide(tree: TetrahedralTree, held: PolygonsByCell, parents: np.ndarray) -> None:
-    """Hand on what lies in nodes that were divided; what changes is told."""
-    dividing, before = np.zeros(len(tree), bool), held.polygons.cell.copy()
-    dividing[parents] = True
-    changed = held.update(tree, dividing, np.zeros(len(tree)))
-    moved = before != held.polygons.cell
-    assert changed[before[moved]].all() and changed[held.polygons.cell[moved]].all()
-    assert not moved[~dividing[before]].any()
+@given(SEEDS, st.sampled_from([0.0, 0.02, 0.5]))
+@settings(deadline=None, max_examples=12)
+def test_area_color_and_moment_are_exact_under_any_cuts(seed: int, slack: float) -> None:
+    """To 1e-6, as sums over all tetrahedra; totals are those of the fragments, and all is in terminal nodes."""
+    polygons = Polygons.everything(placed(thicket(seed), seed))
+    tree, held = divided(polygons, seed, slack)
+    parts = held.items
+    assert (tree.children[held.cell, 0] < 0).all()
+    assert len(parts) > len(polygons)
+    assert parts.areas().sum() == pytest.approx(polygons.areas().sum(), rel=1e-9)
+    assert sums(parts) == pytest.approx(sums(polygons), rel=1e-6, abs=1e-9)
+    totals = sums_by_node(held.totals, held.cell, len(tree))
+    assert totals.area.sum() == pytest.approx(polygons.areas().sum(), rel=1e-9)
+    assert totals.polygons.sum() == len(parts)
 
 
 @given(SEEDS)
-@settings(deadline=None, max_examples=12)
-def test_each_is_in_the_terminal_that_holds_its_middle(seed: int) -> None:
-    """Sums over all tetrahedra are those of the whole, and totals of a part are those of what lies there."""
-    polygons = Polygons.everything(placed(thicket(seed), seed))
-    tree, held = divided(polygons, seed)
-    cell = held.polygons.cell
-    assert (tree.children[cell, 0] < 0).all() and len(np.unique(cell)) > 10
-    np.testing.assert_array_equal(cell, tree.locate(polygons.center))
-    assert held.polygons.items is polygons
-    chosen = np.random.default_rng(seed).random(len(tree)) < 0.5
-    parts = [sums_by_node(*held.totals(some), len(tree)) for some in (chosen, ~chosen)]
-    assert not parts[0].area[~chosen].any() and not parts[1].area[chosen].any()
-    assert sum(part.area.sum() for part in parts) == pytest.approx(polygons.areas().sum(), rel=1e-9)
-    assert sum(part.polygons.sum() for part in parts) == len(polygons)
-    index = np.where(chosen, 0, 1)
-    summary = summarize(support.small_flora(), Contents(polygons=held.polygons), index, 2)
-    np.testing.assert_allclose(summary.optical_area, [part.optical_area.sum() for part in parts], rtol=1e-9)
+@settings(deadline=None, max_examples=8)
+def test_everything_is_on_the_right_side(seed: int) -> None:
+    """Every corner of every polygon lies within its tetrahedron's planes, up to the root; within the slack if any."""
+    for slack in (0.0, 0.1):
+        tree, held = divided(Polygons.everything(placed(thicket(seed, 30), seed)), seed, slack)
+        polygons, node = held.items, held.cell.astype(np.intp)
+        assert (tree.parent[node] >= 0).any()
+        while (tree.parent[node] >= 0).any():
+            parent = np.maximum(tree.parent[node], 0)
+            low, high = polygons.distances(tree.planes(parent))
+            beyond = np.where(tree.children[parent, 1] == node, -low, high)
+            assert beyond[tree.parent[node] >= 0].max() < 1e-7 + slack
+            node = np.where(tree.parent[node] >= 0, parent, node)
 
 
 @given(SEEDS)
 @settings(deadline=None, max_examples=25)
-def test_texture_coordinates_and_attributes_are_those_of_the_surface(seed: int) -> None:
-    """What was an affine function of the place is the same function in the mesh that is made."""
+def test_texture_coordinates_and_attributes_are_interpolated(seed: int) -> None:
+    """What was an affine function of the place before is the same function after cuts."""
     one = thicket(seed, 30, fans=False)
-    mesh = plain(one)
+    meshes = Meshes([one], np.zeros(1, int), np.eye(4)[None])
+    _, held = divided(Polygons.everything(meshes), seed, 0.0)
+    mesh = polygon_buffers(held.items)
     sound(mesh)
     expected = mesh.positions[mesh.corner_verts].astype(np.float64) @ AFFINE.T
     assert mesh.attributes["UVMap"][0] == "CORNER"
     np.testing.assert_allclose(mesh.attributes["UVMap"][1], expected[:, :2], atol=1e-5)
     np.testing.assert_allclose(mesh.attributes["number"][1], expected[:, 2], atol=1e-5)
+
+
+@given(SEEDS)
+@settings(deadline=None, max_examples=25)
+def test_a_plane_leaves_each_piece_on_one_side(seed: int) -> None:
+    """Fractions of a face's triangles add up to 1, and no fragment reaches across."""
+    rng = np.random.default_rng(seed)
+    polygons = Polygons.everything(placed(thicket(seed), seed))
+    normal = rng.normal(size=(len(polygons), 3))
+    planes = np.c_[normal / np.linalg.norm(normal, axis=1, keepdims=True), rng.uniform(-1, 1, len(polygons))]
+    owner, side, parts = cut(polygons, planes)
+    total = np.bincount(owner, area_fractions(parts.weights)[parts.part], len(polygons))
+    np.testing.assert_allclose(total, polygons.meshes.face_size[polygons.face] - 2, atol=1e-12)
+    distance = parts.corner_distances(planes[owner]) * np.where(side, 1, -1)[:, None]
+    assert distance.min() > -1e-8
+
+
+def test_a_cut_face_of_which_all_is_there_is_mended() -> None:
+    """What need not be cut comes out as it went in: faces, materials, even those without area."""
+    one = thicket(1)
+    meshes = placed(one, 1)
+    polygons = Polygons.everything(meshes)
+    _, held = divided(polygons, 1, 0.0)
+    assert len(held) > 2 * len(polygons)
+    whole = mended(held.items)
+    assert (whole.part == -1).all()
+    key = np.sort(whole.instance.astype(np.int64) * 1000 + whole.face)
+    assert (key == np.sort(polygons.instance.astype(np.int64) * 1000 + polygons.face)).all()
+    some = held.items.take(np.random.default_rng(0).random(len(held)) < 0.8)
+    assert mended(some).areas().sum() == pytest.approx(some.areas().sum(), rel=1e-9)
 
 
 def test_whole_faces_share_vertices_and_mirrored_ones_are_turned() -> None:

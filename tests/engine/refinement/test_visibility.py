@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The visibility step against rays cast one by one, whose order comes from their distances and not from the tree."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -10,7 +11,7 @@ import pytest
 from tests.engine.support import face_planes
 from tetflora_addon.camera.camera import Camera, silhouette_pixels
 from tetflora_addon.refinement.rasterize import buffer_size, occluder_depth, pixel_rays
-from tetflora_addon.refinement.visibility import COARSEST, AlphaBuffer, Buffers
+from tetflora_addon.refinement.visibility import COARSEST, AlphaBuffer, Buffers, pixels_of_buffer
 from tetflora_addon.tetrahedra.roots import view_root
 
 # Looks along +y, z up, from 5 m before the origin.
@@ -95,6 +96,12 @@ def compare(vertices, extinction, rank, camera, resolution, fine=112, triangles=
         visibility(vertices, extinction, rank, camera, resolution, occluders),
         cast(vertices, extinction, camera, *size, hidden),
     )
+
+
+@pytest.mark.parametrize(("width", "height"), [(320, 192), (192, 320), (640, 640)])
+def test_pixels_of_the_buffer_are_squares_of_the_images_pixels(width, height):
+    camera = replace(camera_of("PERSP"), width=width, height=height)
+    assert pixels_of_buffer(camera, 64) == pytest.approx(max(width, height) / 64, rel=0.02)
 
 
 @pytest.mark.parametrize("kind", ["PERSP", "ORTHO"])
