@@ -106,11 +106,13 @@ def piece_totals(flora: Flora, pieces: Pieces) -> Totals:
     return Totals(area, wood_areas(flora, pieces), leaves * leaf.polygons[row] + flora.rows["sides"][row], width)
 
 
-def polygon_totals(polygons: Polygons) -> Totals:
-    """Totals of explicit polygons, without what is transparent."""
+def polygon_totals(polygons: Polygons, width: Floats | None = None) -> Totals:
+    """Totals of explicit polygons, without what is transparent; ``width`` (n,) replaces that of the surfaces."""
     meshes, face = polygons.meshes, polygons.face
     area = polygons.areas() * meshes.coverage[meshes.slot[face]]
-    solid, width = meshes.solid[face], meshes.width[face] * meshes.mean_scale[polygons.instance]
+    solid = meshes.solid[face]
+    if width is None:
+        width = meshes.width[face] * meshes.mean_scale[polygons.instance]
     return Totals(np.where(solid, 0.0, area), np.where(solid, area, 0.0), np.ones(len(face)), width)
 
 
