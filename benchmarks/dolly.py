@@ -27,10 +27,10 @@ from tetflora_addon.blender.job.plant_mesh import single_seed
 from tetflora_addon.compiled.flora import compile_species
 from tetflora_addon.emission.plants import expanded_blocks
 from tetflora_addon.growth.hashing import Draw, uniform
-from tetflora_addon.leaves.levels import leaf_levels
+from tetflora_addon.leaves.levels import LeafLevel, leaf_levels
 from tetflora_addon.leaves.outlines import distance_to_links
 from tetflora_addon.species import catalog
-from tetflora_addon.subplants.leaf_meshes import LevelCopies
+from tetflora_addon.subplants.leaf_meshes import LeafCopies
 
 from .pictures import flip_map, read_picture, render
 from .report import Targets, forget_peak, peak_mb
@@ -147,18 +147,19 @@ def _made(scene: bpy.types.Scene, expand: bool) -> object:
 def recording(scene: bpy.types.Scene) -> Iterator[list[Drawn]]:
     """While it lasts, leaves of finer levels are noted as they are written; by this process, not by others."""
     drawn: list[Drawn] = []
-    add, threads = LevelCopies.add, (scene.render.threads_mode, scene.render.threads)
+    add, threads = LeafCopies.add, (scene.render.threads_mode, scene.render.threads)
     scene.render.threads_mode, scene.render.threads = 'FIXED', 1
 
-    def noted(self: LevelCopies, key, position, frame, size, *rest: object) -> None:
-        drawn.append(Drawn(self.shapes, self.model, key, position, frame, size))
+    def noted(self: LeafCopies, key, position, frame, size, *rest: object) -> None:
+        if isinstance(self.of, LeafLevel):
+            drawn.append(Drawn(self.shapes, self.model, key, position, frame, size))
         add(self, key, position, frame, size, *rest)
 
-    LevelCopies.add = noted
+    LeafCopies.add = noted
     try:
         yield drawn
     finally:
-        LevelCopies.add = add
+        LeafCopies.add = add
         scene.render.threads_mode = threads[0]
         if threads[0] == 'FIXED':
             scene.render.threads = threads[1]

@@ -71,7 +71,7 @@ def opened_cell(identifier: str, orders: int) -> Callable[[], tuple[np.ndarray, 
             parts += [("leaf", leaf.form, leaf.buffers) for leaf in leaf_meshes.leaf_meshes(flora, 0, [whole])]
         points = []
         if len(closed):
-            facets = microsurfaces.subplant_facets(flora, closed, np.full(len(closed), FACET))
+            facets = microsurfaces.subplant_facets(flora, closed, microsurfaces.FacetRules(np.full(len(closed), FACET)))
             parts.append(("proxy", 0, facet_mesh(facets)))
         for number, (kind, form, buffers) in enumerate(p for p in parts if p[2] is not None):
             proxy = materials.proxy_material

@@ -32,6 +32,7 @@ from .errors import TetFloraError
 from .files import PART, path_in, read_whole, write_whole
 
 Result = TypeVar("Result")
+Found = TypeVar("Found", Floats, None)
 #: Raise it when files are written in another way.
 _FORMAT = 1
 #: All files of a user together take no more than so many bytes; those that were not used for longest go first. Each has
@@ -68,7 +69,7 @@ def last_problem() -> str:
     return _problem
 
 
-def cached(kind: str, content: str, shape: tuple[int, ...], compute: Callable[[], Floats]) -> Floats:
+def cached(kind: str, content: str, shape: tuple[int, ...], compute: Callable[[], Found]) -> Floats | Found:
     """A result from the cache folder, or computed now and stored there.
 
     Parameters
@@ -80,7 +81,7 @@ def cached(kind: str, content: str, shape: tuple[int, ...], compute: Callable[[]
     shape : tuple of int
         Of the result; a file with another one does not count.
     compute : callable
-        Returns the result: finite numbers, always the same ones to the last bit.
+        Returns the result: finite numbers, always the same ones to the last bit. What is None is not stored.
     """
     if _folder is None:
         return compute()
@@ -88,8 +89,7 @@ def cached(kind: str, content: str, shape: tuple[int, ...], compute: Callable[[]
     if not _OURS.fullmatch(path.name):
         raise ValueError(f"{path.name} is no name of a result")
     values = _read(path, shape)
-    if values is None:
-        values = compute()
+    if values is None and (values := compute()) is not None:
         write_arrays(path, _OURS, MOST_BYTES, values=values, name=np.array(path.name))
     return values
 

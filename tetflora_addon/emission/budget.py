@@ -34,12 +34,14 @@ from ..compiled.sizes import LEVEL, Crown, CrownParts
 from ..growth.growth import WholeBranches, leaf_counts, trunks
 from ..growth.seeds import Branches, Seeds
 from ..leaves.levels import chosen_polygons, leaf_planes
+from ..leaves.models import LeafModel
 from ..refinement.decisions import Decision, contributions, explicit_fraction
 from ..refinement.loop import Refinement
 from ..refinement.settings import RefinementSettings
 from ..subplants.pieces import expand
 from ..subplants.rings import BUD_RINGS, bud_sides, finer, round_up_to
 from ..subplants.tubes import tube_faces
+from .coverage import Coverage
 from .drawing import HIDDEN, HIDDEN_A_PIXEL, HIDDEN_LEAVES, LIT_LEAVES, NEVER_TOO_MANY, OUTSIDE_A_PIXEL, SHADOW, TILE
 from .frontier import DETAIL
 from .plants import BENT, BROAD, NEARER, SIDES, TOLERANCE, TUBES, TWIG, LeafDetail, kite_widths
@@ -110,7 +112,8 @@ def fit_to_budget(
             return detail
         return replace(detail, refinement=_fitted_shells(result, most, faces), tolerance=np.inf)
     polygons = float(len(result.cell_polygons.polygons))
-    number = primitives(result, camera, settings.facet)
+    covered = float(contributions(result.cells, result.transmittance)[result.in_view[result.nodes]].sum())
+    number = primitives(covered, camera, settings.facet)
     coarser = relative_side(number, settings.facet)
     left = max(most - polygons, 0.01 * most) if np.isfinite(most) else most
     coarser = max(coarser, (number / left) ** (1.0 / _FEWER))
@@ -140,9 +143,8 @@ def relative_side(number: float, facet: float) -> float:
     return float(np.clip(np.sqrt(number / few), 1.0 / FINEST, 1.0))
 
 
-def primitives(result: Refinement, camera: Camera, facet: float) -> float:
+def primitives(covered: float, camera: Camera, facet: float) -> float:
     """Polygons and facets (expected) with facets of so many pixels, by the pixels that cells cover."""
-    covered = float(contributions(result.cells, result.transmittance)[result.in_view[result.nodes]].sum())
     return A_PIXEL * covered / facet**2 + (HIDDEN_A_PIXEL + OUTSIDE_A_PIXEL) * camera.width * camera.height
 
 
@@ -338,7 +340,7 @@ def _numbers(
     extent, whole = extent[inside], whole[inside]
     area, wide, wood = parts.area / extent**2, parts.width / extent, parts.form < 0
     before, here, covered = _in_depth(parts, camera, parts.number * area)
-    coarser = _coarser(_OVERLAP * covered, pixels, settings.facet)
+    coarser = relative_side(primitives(_OVERLAP * covered, camera, settings.facet), settings.facet)
     facet = (coarser * settings.facet) ** 2
     most = _LAYERS * facet**0.1 + deep[inside]
     drawn = np.exp(-before / most) * -np.expm1(-here / most) * most / here
@@ -386,11 +388,8 @@ def _polygons(crowns: tuple[Crown, ...], parts: CrownParts, which: Integers, cam
     slope = 0.0 if camera.kind == "ORTHO" else camera.pixel_size
     extent = np.maximum(extent - slope * parts.reach, extent / NEARER)
     out = np.ones((2, len(parts)))
-    for number, crown in enumerate(crowns):
-        for kind, form in enumerate(crown.forms):
-            own = np.flatnonzero((which == number) & (parts.form == kind))
-            if form is not None and len(own):
-                out[:, own] = chosen_polygons(form, _SHARE * parts.length[own] / extent[own] / TOLERANCE)
+    for form, own in _by_form(crowns, parts, which):
+        out[:, own] = chosen_polygons(form, _SHARE * parts.length[own] / extent[own] / TOLERANCE)
     wood = np.flatnonzero(parts.form < 0)
     sides, size = parts.sides[wood], parts.width[wood] / extent[wood] / 2.0
     around, along = finer(sides, size)
@@ -403,12 +402,18 @@ def _polygons(crowns: tuple[Crown, ...], parts: CrownParts, which: Integers, cam
 def _kites(crowns: tuple[Crown, ...], parts: CrownParts, which: Integers) -> Floats:
     """Widths in pixels up to which leaves are kites, and have one for each plane; how many planes that are (3, n)."""
     out = np.ones((3, len(parts)))
+    for form, own in _by_form(crowns, parts, which):
+        out[:, own] = np.array([[*kite_widths([form]), leaf_planes(form).polygons]]).T
+    return out
+
+
+def _by_form(crowns: tuple[Crown, ...], parts: CrownParts, which: Integers) -> Iterator[tuple[LeafModel, Integers]]:
+    """Each known form of leaf, and those of parts (k,) that have it, of crowns (n,)."""
     for number, crown in enumerate(crowns):
         for kind, form in enumerate(crown.forms):
-            own = (which == number) & (parts.form == kind)
-            if form is not None:
-                out[:, own] = np.array([[*kite_widths([form]), leaf_planes(form).polygons]]).T
-    return out
+            own = np.flatnonzero((which == number) & (parts.form == kind))
+            if form is not None and len(own):
+                yield form, own
 
 
 def _through(stand: Stand, parts: CrownParts, plant: Integers, extent: Floats) -> Floats:
@@ -427,14 +432,10 @@ def _in_depth(parts: CrownParts, camera: Camera, pixels: Floats) -> tuple[Floats
     """
     if not len(parts):
         return np.zeros(0), np.zeros(0), 0.0
-    local = camera.to_camera_space(parts.position)
-    x, y, depth = local.T
-    if camera.kind == "PANO":
-        (x, y), depth = camera.longitude_latitude(local), np.linalg.norm(local, axis=1)
-    elif camera.kind == "PERSP":
-        x, y = x / np.maximum(depth, camera.near), y / np.maximum(depth, camera.near)
-    left, right, bottom, top = camera.window
-    x, y = np.clip((x - left) / (right - left), 0.0, 1.0), np.clip((y - bottom) / (top - bottom), 0.0, 1.0)
+    image = Coverage(camera, (0, 1))
+    *place, depth = image.project(parts.position)
+    sizes = (image.width, camera.width), (image.height, camera.height)  # with what lies around it, and without
+    x, y = (np.clip((of - (all_ - own) / 2) / own, 0.0, 1.0) for of, (all_, own) in zip(place, sizes, strict=True))
     strips = max(round(np.sqrt(len(x) / _IN_CELL)), 1)
     column, wide = _groups(x, np.zeros(len(x), np.int64), strips)
     cell, tall = _groups(y, column, strips)
@@ -461,12 +462,6 @@ def _groups(place: Floats, group: Integers, number: int) -> tuple[Integers, Floa
     np.maximum.at(high, out, place)
     # Those on the border stand for as much beyond it as is between two.
     return out, np.where(many > 1, (high - low) * many / np.maximum(many - 1, 1), 0.0)
-
-
-def _coarser(covered: float, pixels: float, facet: float) -> float:
-    """Sides of facets over those that are asked for, as of `fit_to_budget` without limits."""
-    number = A_PIXEL * covered / facet**2 + (HIDDEN_A_PIXEL + OUTSIDE_A_PIXEL) * pixels
-    return relative_side(number, facet)
 
 
 #: Plants that are grown one and all, the nearest ones, and how many of the others tell about them.
@@ -499,13 +494,11 @@ def expanded_faces(flora: Flora, seeds: Seeds, camera: Camera) -> Iterator[Float
     away = np.linalg.norm(plants.position - camera.position, axis=1) - across
     order = np.argsort(away, kind="stable")
     detail = LeafDetail(flora, camera)
-    for number in range(min(_ALL, len(order))):
-        total = total + _more(flora, plants.take(order[number : number + 1]), detail)
-        yield total
     rest = order[_ALL:]
     some = rest[np.linspace(0, len(rest) - 1, min(_SOME, len(rest))).round().astype(np.int64)]
-    for number in range(len(some)):
-        total = total + _more(flora, plants.take(some[number : number + 1]), detail) * len(rest) / len(some)
+    each = np.repeat([1.0, len(rest) / max(len(some), 1)], [min(_ALL, len(order)), len(some)])
+    for one, times in zip(np.concatenate([order[:_ALL], some]), each, strict=True):
+        total = total + times * _more(flora, plants.take(one[None]), detail)
         yield total
 
 

@@ -20,10 +20,11 @@ from ..buffers import MeshBuffers, concatenate_buffers, kept_faces
 from ..camera.camera import Camera
 from ..compiled.flora import Flora
 from ..growth.hashing import place_keys, uniform
+from ..parallel import blocks
 from ..processes.pool import in_processes
 from ..proxies.facet_weights import FacetWeights
 from ..proxies.microsurfaces import CIRCUMRADIUS, STRETCH, Facets, pushed_outside_view
-from ..proxies.primitives import Primitive, Triangles, joined, triangle_corners
+from ..proxies.primitives import Primitive, joined, triangle_corners
 from ..refinement.contents import polygon_totals
 from ..refinement.decisions import contributions
 from ..refinement.loop import Refinement
@@ -177,9 +178,9 @@ def drawn_blocks(given: Drawing) -> Iterator[Block | Parts | Shown]:
     yield from shown
     items: list[tuple] = [(number, *tile) for number, tile in enumerate(tiles)]
     for kind, own in enumerate(outside):
-        for start in range(0, len(own), _OUTSIDE_BATCH):
+        for run in blocks(len(own), _OUTSIDE_BATCH):
             some = [other.take(slice(0)) for other in outside]
-            some[kind] = own.take(slice(start, start + _OUTSIDE_BATCH))
+            some[kind] = own.take(run)
             items.append((len(tiles), None, some, len(some[kind]) / sum(map(len, outside))))
     del tiles, outside
     whole = max(len(items), 1)
@@ -540,7 +541,8 @@ class _Tile(Canvas):
 
 def _places(drawn: Primitive) -> Floats:
     """A place (n, 3) of each facet, or of what is drawn for it."""
-    return drawn.corners[:, 0].astype(np.float64) if isinstance(drawn, Triangles) else drawn.center.astype(np.float64)
+    place = drawn.center if isinstance(drawn, Facets) else drawn.place
+    return (place if place.ndim == 2 else place[:, 0]).astype(np.float64)
 
 
 def quarters(facets: Facets) -> Facets:

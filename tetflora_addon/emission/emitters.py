@@ -9,13 +9,13 @@ from functools import partial
 
 import numpy as np
 
-from ..arrays import Floats, Integers
+from ..arrays import Floats
 from ..buffers import MeshBuffers, PointBuffers
 from ..camera.camera import Camera
 from ..compiled.flora import Flora
 from ..light.illumination import BakedLight, baked_attributes
-from ..proxies import primitives
 from ..proxies.microsurfaces import Facets
+from ..proxies.primitives import DrawnShapes, joined, shape_buffers, spheres_of, triangles_of
 from ..refinement.lights import sun_of
 from ..refinement.loop import Refinement
 from .asset_plan import AssetPlan, OriginalPolicy, explicit_plan
@@ -122,14 +122,9 @@ class ProxyEmitter:
         return self.faces is None
 
 
-def as_triangles(facets: Facets, _seen: bool) -> primitives.Primitive:
-    """The form of *Microsurfaces*."""
-    return primitives.triangles_of(facets)
-
-
 @dataclass(frozen=True)
-class AsSpheres:
-    """The form of *Microspheres*, and of *Automatic*, where ``seen_too`` is False and what is seen becomes triangles.
+class FacetForm:
+    """What facets become where they are made: triangles, but spheres where they are seen, where they are not, or both.
 
     In the fidelity benchmark facets come closer to the plants wherever they are seen. Hidden proxies only cast shadows
     and light other plants; spheres do that as well with a third of the memory.
@@ -138,25 +133,22 @@ class AsSpheres:
     camera: Camera
     disc: float
     sun: Floats | None
-    seen_too: bool
+    spheres: tuple[bool, ...]  # for those that are seen (True), and for those that are not
 
-    def __call__(self, facets: Facets, seen: bool) -> primitives.Primitive:
+    def __call__(self, facets: Facets, seen: bool) -> DrawnShapes:
         """Spheres or triangles."""
-        if seen and not self.seen_too:
-            return primitives.triangles_of(facets)
-        return primitives.spheres_of(facets, self.camera if seen else None, self.disc, self.sun)
+        if seen not in self.spheres:
+            return triangles_of(facets)
+        return spheres_of(facets, self.camera if seen else None, self.disc, self.sun)
 
 
 def facet_blocks(refined: EmissionInput) -> Iterator[Buffers]:
     """Facets as the form of the drawing has made them: triangles, spheres, or triangles where they are seen."""
     for parts in refined.facet_parts():
-        triangles = [some for some, _ in parts if isinstance(some, primitives.Triangles)]
-        spheres = [some for some, _ in parts if isinstance(some, primitives.Spheres)]
-        if triangles:
-            mesh = primitives.triangle_mesh(primitives.joined(triangles))
-            yield replace(mesh, species=parts.species, look=parts.look)
-        if spheres:
-            yield replace(primitives.sphere_points(primitives.joined(spheres)), species=parts.species, look=parts.look)
+        for round_ in (False, True):
+            own = [some for some, _ in parts if (some.radius is not None) == round_]
+            if own:
+                yield replace(shape_buffers(joined(own)), species=parts.species, look=parts.look)
 
 
 def shell_blocks(
@@ -168,33 +160,31 @@ def shell_blocks(
         yield shells
 
 
-def _numbered(refined: EmissionInput, first_sheet: int) -> Iterator[tuple[Parts, Facets, Integers]]:
-    """Blocks of facets, each as parts and as one, with the sheets (n,) that they are in baked light."""
+def baked_facet_blocks(
+    refined: EmissionInput, light: BakedLight, first_sheet: int, round_: bool = False
+) -> Iterator[Buffers]:
+    """Facets, or a sphere for each, with baked light, in which the first of them is that sheet."""
+    sun = sun_of(refined.refinement.lights)
+    form = FacetForm(refined.camera, refined.disc, sun, (True, False) if round_ else ())
     for parts in refined.facet_parts():
-        facets = primitives.joined([some for some, _ in parts])
-        yield parts, facets, np.arange(first_sheet, first_sheet + len(facets))
+        facets = joined([some for some, _ in parts])
+        sheets = np.arange(first_sheet, first_sheet + len(facets))
         first_sheet += len(facets)
-
-
-def _baked_facets(refined: EmissionInput, light: BakedLight, first_sheet: int) -> Iterator[MeshBuffers]:
-    for parts, facets, sheets in _numbered(refined, first_sheet):
-        made, values = primitives.facet_mesh(facets), baked_attributes('FACE', *light.of_facets(facets, sheets))
+        made = shape_buffers(joined([form(some, seen) for some, seen in parts]))
+        if round_:
+            baked = baked_attributes('POINT', light.of_spheres(facets, sheets))
+            values = {name: array for name, (_, array) in baked.items()}
+        else:
+            values = baked_attributes('FACE', *light.of_facets(facets, sheets))
         yield replace(made, attributes={**made.attributes, **values}, species=parts.species, look=parts.look)
 
 
-def _baked_spheres(refined: EmissionInput, light: BakedLight, first_sheet: int) -> Iterator[PointBuffers]:
-    camera, sun = refined.camera, sun_of(refined.refinement.lights)
-    for parts, facets, sheets in _numbered(refined, first_sheet):
-        drawn = [primitives.spheres_of(some, camera if seen else None, refined.disc, sun) for some, seen in parts]
-        made, values = primitives.sphere_points(primitives.joined(drawn)), light.of_spheres(facets, sheets)
-        baked = {name: array for name, (_, array) in baked_attributes('POINT', values).items()}
-        yield replace(made, attributes={**made.attributes, **baked}, species=parts.species, look=parts.look)
-
-
-MICROSURFACES = ProxyEmitter(facet_blocks, lambda _camera, _disc, _sun: as_triangles, _baked_facets)
-MICROSPHERES = ProxyEmitter(facet_blocks, partial(AsSpheres, seen_too=True), _baked_spheres)
+MICROSURFACES = ProxyEmitter(facet_blocks, partial(FacetForm, spheres=()), baked_facet_blocks)
+MICROSPHERES = ProxyEmitter(
+    facet_blocks, partial(FacetForm, spheres=(True, False)), partial(baked_facet_blocks, round_=True)
+)
 #: Facets where they are seen, spheres elsewhere. Where light is baked, all are facets.
-AUTOMATIC = ProxyEmitter(facet_blocks, partial(AsSpheres, seen_too=False), _baked_facets)
+AUTOMATIC = ProxyEmitter(facet_blocks, partial(FacetForm, spheres=(False,)), baked_facet_blocks)
 #: Shells fill their tetrahedra evenly, so that hidden ones are divided as well; those that are seen further, because
 #: their shape shows.
 SHELLS = ProxyEmitter(shell_blocks, None, shell_blocks, faces=4.0, hidden_block=16.0, proxy_block=4.0)

@@ -37,8 +37,8 @@ from ..leaves.levels import coarse_error, leaf_kites
 from ..leaves.models import LeafModel
 from ..processes.pool import WORTH_PROCESSES, in_processes
 from ..proxies.facet_weights import FacetWeights, leaf_shares
-from ..proxies.hotspots import LightRatios, light_ratios
-from ..proxies.microsurfaces import Facets, piece_facets, subplant_facets
+from ..proxies.hotspots import light_ratios
+from ..proxies.microsurfaces import FacetRules, Facets, piece_facets, subplant_facets
 from ..refinement.contents import PlantParts, as_pieces, piece_totals
 from ..refinement.decisions import Decision, explicit_fraction
 from ..refinement.lights import Light
@@ -46,7 +46,7 @@ from ..refinement.loop import Refinement
 from ..refinement.shared_parts import SharedParts, SharePoints, descend, opened
 from ..species.species import LEAF_KINDS
 from ..subplants.leaf_meshes import leaf_meshes
-from ..subplants.pieces import Pieces, Thin, expand, whole_pieces
+from ..subplants.pieces import Thin, expand, whole_pieces
 from ..subplants.rings import Pixels
 from ..subplants.tubes import tube_buffers, twig_buffers
 from .coverage import Coverage, Footprints
@@ -386,39 +386,48 @@ class GrownPlants(FrontierKind):
         extent = self.camera.extent_around(slab.center)
         lines = parts.branch_only | ~parts.can_open(self.flora)
         lines &= parts.branch_only | (2.0 * slab.radius > LINES * extent) | (self.transition.of_branches(branches) > 0)
-        self._draw_subplants(canvas, branches.take(np.flatnonzero(~lines)), side[~lines])
+        for s, every in self._by_species(branches):
+            some = every[~lines[every]]
+            if len(some):
+                own = branches.take(some)
+                rules = self._rules(own, side[some], False, thin=canvas.thin)
+                canvas.add_facets((s, ""), subplant_facets(self.flora, own, rules))
         self._draw_branches(canvas, branches.take(np.flatnonzero(lines)), side[lines])
 
     def unseen(
         self, parts: PlantParts, side: Floats, kept: Floats, _shown: list[Shown]
     ) -> Iterator[tuple[Whose, Facets]]:
         """As of `FrontierKind`."""
-        species = self.flora.species_of(parts.branches.row)
-        for s in np.flatnonzero(np.bincount(species)).tolist():
-            some = np.flatnonzero((species == s) & ~parts.branch_only)
-            if len(some):
-                yield (s, ""), self._of_subplants(parts.branches.take(some), side[some], side[some], 1.0 - kept[some])
-            some = np.flatnonzero((species == s) & parts.branch_only)
-            if len(some):
-                yield (s, ""), self._of_pieces(as_pieces(parts.branches.take(some)), side[some])
+        for s, every in self._by_species(parts.branches):
+            for alone in (False, True):
+                some = every[parts.branch_only[every] == alone]
+                own = parts.branches.take(some)
+                if len(own) and alone:
+                    yield (s, ""), piece_facets(self.flora, as_pieces(own), self._rules(own, side[some], alone))
+                elif len(own):
+                    rules = self._rules(own, side[some], alone, 1.0 - kept[some])
+                    yield (s, ""), subplant_facets(self.flora, own, rules)
 
-    def _draw_subplants(self, canvas: Canvas, branches: Branches, side: Floats) -> None:
-        if not len(branches):
-            return
-        leaf = np.maximum(side, np.sqrt(self.flora.one_leaf_area(branches)))
+    def _by_species(self, branches: Branches) -> Iterator[tuple[int, Integers]]:
+        """Each species that there is, and its branches (k,)."""
         species = self.flora.species_of(branches.row)
         for s in np.flatnonzero(np.bincount(species)).tolist():
-            some = np.flatnonzero(species == s)
-            own = branches.take(some)
-            canvas.add_facets((s, ""), self._of_subplants(own, leaf[some], side[some], thin=canvas.thin))
+            yield s, np.flatnonzero(species == s)
 
-    def _of_subplants(
-        self, branches: Branches, leaf: Floats, wood: Floats, left_out: Floats | None = None, thin: Thin | None = None
-    ) -> Facets:
-        count = self._optical(branches) / np.maximum(leaf, 1e-12) ** 2
-        weight = self.weights.of_subplants(branches.row, count, leaf_shares(self.flora, branches))
-        lit = None if thin is None else self._lit(branches, leaf)
-        return subplant_facets(self.flora, branches, leaf, wood, weight, left_out, lit, thin)
+    def _rules(
+        self, branches: Branches, side: Floats, alone: bool, explicit: Floats | None = None, thin: Thin | None = None
+    ) -> FacetRules:
+        """How facets of sides (n,), meters, are made of branches (n,) alone or with all that grows on them.
+
+        A fraction (n,) of their leaves is real. Only those that are seen are thinned out and lit as these.
+        """
+        flora = self.flora
+        leaf = np.maximum(side, np.sqrt(flora.one_leaf_area(branches)))
+        count = (flora.leaf_areas(branches) + flora.wood_areas(branches) / 2) / np.maximum(leaf, 1e-12) ** 2
+        weights = self.weights.of_pieces if alone else self.weights.of_subplants
+        lit = None if thin is None else light_ratios(flora, branches, leaf, self.camera, self.lights)
+        weight = weights(branches.row, count, leaf_shares(flora, branches))
+        return FacetRules(leaf, side, weight, explicit, lit, thin)
 
     def _draw_branches(self, canvas: Canvas, branches: Branches, side: Floats) -> None:
         """Branches alone: leaves that are large are real, wood is tubes or thin triangles, the rest is facets."""
@@ -428,17 +437,18 @@ class GrownPlants(FrontierKind):
         branches = replace(branches, plant=np.arange(len(branches), dtype=np.int32))
         whole, explicit = WholeBranches(branches, axes(flora.rows, branches)), transition.of_own_leaves(branches)
         pieces, owner = whole_pieces(flora.rows, whole)
-        species = flora.species_of(branches.row)
+        rules = self._rules(branches, side, True, explicit, canvas.thin)
         extent = np.maximum(transition.camera.extent_around(branches.position), 1e-300)
         wide = 2.0 * branches.radius / extent
         tubes = uniform(branches.key, Draw.TRANSITION) < explicit_fraction(wide, TUBES)
         thin, detail = wide < BROAD, transition.detail
-        for s in np.flatnonzero(np.bincount(species)).tolist():
-            own = species == s
+        for s, every in self._by_species(branches):
+            own = np.zeros(len(branches), bool)
+            own[every] = True
             left = np.flatnonzero(own[owner] & (explicit[owner] < 1.0))
             if len(left):
-                of = whole, owner[left]
-                canvas.add_facets((s, ""), self._of_pieces(pieces.take(left), side, explicit, of, canvas.thin))
+                of = owner[left]
+                canvas.add_facets((s, ""), piece_facets(flora, pieces.take(left), rules.take(of), (whole, of)))
             some = whole.take(np.flatnonzero(own & (explicit > 0.0)))
             given = lambda b: (explicit[b.plant], *transition.of_kites(b)), detail.lengths, canvas.thin
             for one in leaf_meshes(flora, s, [some], *given) if len(some) else ():
@@ -462,31 +472,3 @@ class GrownPlants(FrontierKind):
         off = whole.lines.bend() / (BENT * extent[branches.plant[some]])
         parts = np.clip(np.ceil(np.sqrt(off)).astype(np.int64), 1, whole.lines.segments)
         canvas.add_mesh(("bark", 0, species), twig_buffers(self.flora, whole, 1.0 / likely[some], parts), True)
-
-    def _of_pieces(
-        self,
-        pieces: Pieces,
-        side: Floats,
-        explicit: Floats | None = None,
-        whole: tuple[WholeBranches, Integers] | None = None,
-        thin: Thin | None = None,
-    ) -> Facets:
-        """Facets of pieces: of their leaves where whole branches (n,) are seen, else of their wood as well.
-
-        Sides (n,) and real fractions (n,) are those of branches.
-        """
-        flora, branches = self.flora, pieces.branches if whole is None else whole[0].branches
-        leaf = np.maximum(side, np.sqrt(flora.one_leaf_area(branches)))
-        count = self._optical(branches) / np.maximum(leaf, 1e-12) ** 2
-        weight = self.weights.of_pieces(branches.row, count, leaf_shares(self.flora, branches))
-        if whole is None:
-            return piece_facets(flora, pieces, leaf, side, weight, explicit)
-        own = (of[whole[1]] for of in (leaf, side, weight, explicit))
-        return piece_facets(flora, pieces, *own, self._lit(branches, leaf).take(whole[1]), thin, whole)
-
-    def _optical(self, branches: Branches) -> Floats:
-        return self.flora.leaf_areas(branches) + self.flora.wood_areas(branches) / 2
-
-    def _lit(self, branches: Branches, side: Floats) -> LightRatios:
-        """Light on facets of sides (n,) over that on the leaves of branches."""
-        return light_ratios(self.flora, branches, side, self.camera, self.lights)

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from ..arrays import Floats, Integers, Mask
 from ..camera.camera import Camera
+from ..parallel import blocks
 from ..refinement.rasterize import buffer_size, image_places, occluder_depth, tetrahedron_fragments
 from ..refinement.visibility import OPAQUE, depth_in_front
 
@@ -195,8 +196,7 @@ class LightBuffer:
             Whether the point is in view.
         """
         result, seen = np.ones(len(points)), np.zeros(len(points), bool)
-        for start in range(0, len(points), POINT_BATCH):
-            part = slice(start, start + POINT_BATCH)
+        for part in blocks(len(points), POINT_BATCH):
             taps, inside = self._taps(points[part])
             depth = exact = own_depth[part][inside][:, None]
             if len(self):
@@ -208,7 +208,7 @@ class LightBuffer:
                 drawn = np.where(has & (own <= place), counted, 0.0)
                 # Where the point's own tetrahedron does not reach into a pixel, its neighbors do, or nothing is there.
                 depth = np.maximum(np.maximum(depth - drawn, 0.0) + np.minimum(drawn, exact), exact)
-            some = np.flatnonzero(inside) + start
+            some = np.flatnonzero(inside) + part.start
             result[some] = (np.exp(-depth) * taps.weight).sum(axis=1)
             seen[some] = True
         return result, seen
@@ -229,13 +229,13 @@ class LightBuffer:
         if not len(self):
             return result
         emitted, arriving = self._emitted, self._arriving
-        for start in range(0, len(points), POINT_BATCH):
-            taps, inside = self._taps(points[start : start + POINT_BATCH])
+        for part in blocks(len(points), POINT_BATCH):
+            taps, inside = self._taps(points[part])
             place, found = self._last_before(taps)
             through = np.exp(-(self._up_to(place, taps) - self._before[place]))[..., None]
             light = arriving[place] * through + emitted[place] * (1.0 - through)
             light = np.where(found[..., None], light, 0.0) * taps.weight[..., None]
-            result[np.flatnonzero(inside) + start] = light.sum(axis=1)
+            result[np.flatnonzero(inside) + part.start] = light.sum(axis=1)
         return result
 
     def _gathered(self, emitted: Floats) -> Floats:

@@ -15,11 +15,12 @@ from dataclasses import dataclass, replace
 from typing import Self
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
-from ..arrays import Floats, Floats32, Integers
+from ..arrays import Arrays, Floats, Floats32, Integers
 from ..camera.camera import Camera, to_eye
 from ..compiled.flora import Flora
+from ..parallel import blocks
 from ..proxies.microsurfaces import Facets
 from ..refinement.decisions import Decision
 from ..refinement.lights import Light
@@ -27,14 +28,27 @@ from ..refinement.loop import Refinement
 from ..tetrahedra.geometry import volume
 from . import scattering
 from .buffers import LightBuffer
-from .receivers import MediumCells, SurfaceElements, cell_of_node
+from .receivers import MediumCells, SurfaceElements, numbers_of
 from .scattering import DIRECTIONS
 from .sources import Near, World, arriving, buffers_of, light_resolution, split_areas
 
 #: Maximum ratio of an order of scattering to the one before: 1 would never end.
 _MOST_AGAIN = 0.97
-#: Facets that are shaded together; some 1 kB each.
-_BATCH = 1 << 16
+#: Facets and faces whose light is computed together; some 2 kB each.
+BATCH = 1 << 16
+
+
+@dataclass(frozen=True)
+class Surfaces(Arrays):
+    """Surfaces (m) in the light: facets, leaves and faces, or clouds around points."""
+
+    center: Floats  # (m, 3): meters
+    normal: Floats  # (m, 3): unit vectors that point to the front
+    color: Floats  # (m, 3): linear RGB
+    transmission: Floats  # (m,): fraction of the scattered light that passes through; 0 for bark
+    cell: Integers  # (m,): tetrahedron (index into the clouds) that holds each, −1 for none
+    sheet: Integers | None = None  # (m,): sheet (index) on which each lies, which does not shadow it
+    dull: Floats | None = None  # (m,): part of the gloss that is lost; None for 0
 
 
 @dataclass(frozen=True)
@@ -131,89 +145,40 @@ class Illumination:
             result += light * np.maximum(np.sum(normals * toward, axis=1), 0.0)[:, None]
         return result
 
-    def facet_radiance(
-        self,
-        center: Floats,
-        normal: Floats,
-        color: Floats,
-        transmission: Floats,
-        cells: Integers,
-        camera: Camera,
-        sheets: Integers | None = None,
-        dull: Floats | None = None,
-    ) -> tuple[Floats32, Floats32]:
-        """Outgoing radiance of facets or leaves.
+    def facet_radiance(self, surfaces: Surfaces, camera: Camera) -> tuple[Floats32, Floats32]:
+        """Outgoing radiance of the fronts and backs (m, 3) of facets or leaves, linear RGB, as a pixel shows it.
 
-        Parameters
-        ----------
-        center, normal : (m, 3) float64
-            Meters; unit vectors that point to the front.
-        color : (m, 3) float64
-            Linear RGB.
-        transmission : (m,) float64
-            Fraction of the scattered light that passes through; 0 for bark.
-        cells : (m,) int
-            As for `direct`.
-        camera : Camera
-            For the gloss.
-        sheets : (m,) int, optional
-            As for `direct`.
-        dull : (m,) float64, optional
-            Part of the gloss that is lost.
-
-        Returns
-        -------
-        front, back : (m, 3) float32
-            Linear RGB, as a pixel shows it.
+        The camera is for the gloss.
         """
-        front, back = np.zeros((2, len(center), 3), np.float32)
-        for start in range(0, len(center), _BATCH):
-            part = slice(start, start + _BATCH)
-            hidden = 0.0 if dull is None else dull[part]
-            fractions = scattering.scattered_fractions(color[part], transmission[part], hidden)
-            view = to_eye(camera, center[part])
-            sides = scattering.facet_ambient(normal[part], fractions, self.around(center[part], cells[part]), view)
-            on = None if sheets is None else sheets[part]
-            for toward, light in self.direct(center[part], cells[part], on):
-                added = scattering.facet_direct(normal[part], fractions, toward, light, view)
+        front, back = np.zeros((2, len(surfaces), 3), np.float32)
+        for part in blocks(len(surfaces), BATCH):
+            own = surfaces.take(part)
+            hidden = 0.0 if own.dull is None else own.dull
+            fractions = scattering.scattered_fractions(own.color, own.transmission, hidden)
+            view = to_eye(camera, own.center)
+            sides = scattering.facet_ambient(own.normal, fractions, self.around(own.center, own.cell), view)
+            for toward, light in self.direct(own.center, own.cell, own.sheet):
+                added = scattering.facet_direct(own.normal, fractions, toward, light, view)
                 sides = sides[0] + added[0], sides[1] + added[1]
             front[part], back[part] = sides
         return front, back
 
-    def cloud_radiance(
-        self,
-        points: Floats,
-        color: Floats,
-        transmission: Floats,
-        cells: Integers,
-        camera: Camera,
-        normal: Floats,
-        plane: Floats,
-    ) -> Floats32:
+    def cloud_radiance(self, surfaces: Surfaces, camera: Camera, plane: Floats) -> Floats32:
         """Radiance (m, 3) of microspheres or, the same, of thick clouds around points, as the camera sees them.
 
-        Parameters
-        ----------
-        points, color, transmission, cells
-            As for `facet_radiance`.
-        camera : Camera
-        normal : (m, 3) float64
-            Axis of the plane term; both ways are alike.
-        plane : (m,) float64
-            Weight of the plane term.
+        ``plane`` (m,) is the weight of the plane term, whose axis is the normal; both ways are alike.
         """
-        result = np.zeros((len(points), 3), np.float32)
-        for start in range(0, len(points), _BATCH):
-            part = slice(start, start + _BATCH)
-            fractions = scattering.scattered_fractions(color[part], transmission[part])
-            axis, view, around = normal[part], to_eye(camera, points[part]), self.around(points[part], cells[part])
-            axis = axis * np.where(np.sum(axis * view, axis=1) < 0.0, -1.0, 1.0)[:, None]
+        result = np.zeros((len(surfaces), 3), np.float32)
+        for part in blocks(len(surfaces), BATCH):
+            own, weight = surfaces.take(part), plane[part, None]
+            fractions = scattering.scattered_fractions(own.color, own.transmission)
+            view, around = to_eye(camera, own.center), self.around(own.center, own.cell)
+            axis = own.normal * np.where(np.sum(own.normal * view, axis=1) < 0.0, -1.0, 1.0)[:, None]
             particles = scattering.particle_ambient(fractions, around, view)
             planes = scattering.facet_ambient(axis, fractions, around, view)[0]
-            for toward, light in self.direct(points[part], cells[part]):
+            for toward, light in self.direct(own.center, own.cell):
                 particles += scattering.particle_direct(fractions, toward, light, view)
                 planes += scattering.facet_direct(axis, fractions, toward, light, view)[0]
-            weight = plane[part][:, None]
             result[part] = (1.0 - weight) * particles + weight * planes
         return result
 
@@ -222,10 +187,10 @@ class Illumination:
 
         The paper's blend of p cos φ and p cos α + s cos^spear β with the light of all lamps; linear between vertices.
         """
-        cells = np.repeat(np.arange(len(self.clouds)), 4)
-        c = self.clouds
-        points, means = c.key_points.reshape(-1, 3), (c.color[cells], c.transmission[cells])
-        return self.cloud_radiance(points, *means, cells, camera, c.normal[cells], c.plane[cells]).reshape(-1, 4, 3)
+        cells, c = np.repeat(np.arange(len(self.clouds)), 4), self.clouds
+        look = c.normal[cells], c.color[cells], c.transmission[cells]
+        around = Surfaces(c.key_points.reshape(-1, 3), *look, cells)
+        return self.cloud_radiance(around, camera, c.plane[cells]).reshape(-1, 4, 3)
 
     def scatter(self, ground: Floats, orders: int) -> Iterator[float]:
         """Sample the sky at the key points, then scatter; the last step of `shadow_steps`.
@@ -325,8 +290,6 @@ SKY_SHEETS = 40_000
 ORDERS = 2
 #: Attributes of baked light: linear radiance of the side to which normals point, and of the other side.
 FRONT, BACK = "tf_light_front", "tf_light_back"
-#: Facets and faces whose light is computed together; some 2 kB each.
-BATCH = 1 << 16
 #: Maximum longer side in pixels of a lamp's buffer, with ground in it and without.
 GROUND_PIXELS, OPEN_PIXELS = 1024, 4096
 #: Suns have views of their own of what is nearer to the camera than these fractions of the distance to the farthest
@@ -334,16 +297,28 @@ GROUND_PIXELS, OPEN_PIXELS = 1024, 4096
 NEAR_FRACTIONS, NEAR_SHEETS = (1 / 32, 1 / 8), 1000
 
 
+@dataclass(frozen=True)
+class Sources:
+    """Lights and opaque polygons of a scene."""
+
+    lights: Sequence[Light]
+    world: World
+    occluders: Floats  # (t, 3, 3): triangles of ground and buildings, meters
+    ground: Floats  # (3,): their mean color, linear, which lights crowns from below
+
+    def counted_from(self, origin: Floats) -> Self:
+        """The same in coordinates that begin at a place (3,) of the present ones."""
+        lights = tuple(light.counted_from(origin) for light in self.lights)
+        return replace(self, lights=lights, occluders=self.occluders - origin)
+
+
 def shadow_steps(
     clouds: MediumCells,
-    lights: Sequence[Light],
-    world: World,
-    occluders: Floats | None = None,
+    sources: Sources,
     resolution: int = 512,
-    ground: ArrayLike = (0.0, 0.0, 0.0),
-    orders: int = ORDERS,
     sheets: SurfaceElements | None = None,
     near: Near | None = None,
+    orders: int = ORDERS,
 ) -> Generator[float, None, Illumination]:
     """Render a scene from all of its lights; yields the fraction that is done.
 
@@ -353,25 +328,19 @@ def shadow_steps(
     ----------
     clouds : MediumCells
         All tetrahedra that hold something.
-    lights : sequence of Light
-    world : World
-    occluders : (t, 3, 3) float64, optional
-        Triangles of opaque polygons, meters.
+    sources : Sources
     resolution : int
         Longer side of a lamp's buffer, pixels; see `light_resolution`. The sky's are `SKY_FRACTION` of it.
-    ground : (3,) float
-        Mean color of the polygons, which lights crowns from below.
-    orders : int
-        Orders of scattering that are gathered one by one, at least 1.
     sheets : SurfaceElements, optional
         Facets and leaves as they are drawn. Clumps smaller than tetrahedra shadow themselves, which an even cloud does
         not; a pixel should be about as large as a sheet.
     near : Near, optional
         Part of the scene that gets buffers of its own from suns.
+    orders : int
+        Orders of scattering that are gathered one by one, at least 1.
     """
     sheets = SurfaceElements.none(len(clouds)) if sheets is None else sheets
-    lamps = []
-    split = split_areas(tuple(lights))
+    lamps, split, occluders = [], split_areas(tuple(sources.lights)), sources.occluders
     for number, light in enumerate(split):
         buffers = buffers_of(light, clouds, sheets, occluders, resolution, near) if light.shadow else []
         lamps.append(LampBuffers(light, buffers))
@@ -385,25 +354,10 @@ def shadow_steps(
         views = buffers_of(light, clouds, fewer, occluders, fine)
         sky.append(views[0] if views else None)
         yield 0.3 + 0.3 * len(sky) / len(DIRECTIONS)
-    found = Illumination(clouds, sheets, lamps, sky, world, (fewer, number))
-    for fraction in found.scatter(np.asarray(ground, np.float64), max(orders, 1)):
+    found = Illumination(clouds, sheets, lamps, sky, sources.world, (fewer, number))
+    for fraction in found.scatter(sources.ground, max(orders, 1)):
         yield 0.6 + 0.4 * fraction
     return found
-
-
-@dataclass(frozen=True)
-class Sources:
-    """Lights and opaque polygons of a scene."""
-
-    lights: tuple[Light, ...]
-    world: World
-    occluders: Floats  # (t, 3, 3): triangles of ground and buildings, meters
-    ground: Floats  # (3,): their mean color, linear
-
-    def counted_from(self, origin: Floats) -> Self:
-        """The same in coordinates that begin at a place (3,) of the present ones."""
-        lights = tuple(light.counted_from(origin) for light in self.lights)
-        return replace(self, lights=lights, occluders=self.occluders - origin)
 
 
 class SheetList:
@@ -448,8 +402,8 @@ class BakedLight:
 
     def of_facets(self, facets: Facets, sheets: Integers) -> tuple[NDArray, NDArray]:
         """Radiance (n, 3) of the fronts and of the backs of facets, which are these sheets (n,) of the list."""
-        surface = facets.center, facets.normal, facets.color, facets.transmission
-        return self.illumination.facet_radiance(*surface, self.cell[sheets], self.camera, sheets, facets.dull)
+        look = facets.color, facets.transmission, self.cell[sheets], sheets, facets.dull
+        return self.illumination.facet_radiance(Surfaces(facets.center, facets.normal, *look), self.camera)
 
     def of_spheres(self, facets: Facets, sheets: Integers) -> NDArray:
         """Radiance (n, 3) of spheres in the place of facets, which are these sheets (n,) of the list.
@@ -480,8 +434,8 @@ class BakedLight:
         corners = positions[corner_verts[_four_corners(offsets)]].astype(np.float64)
         normal = np.cross(corners[:, 2] - corners[:, 0], corners[:, 3] - corners[:, 1])
         normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-30)
-        surface = _middles(corners), normal, color.astype(np.float64), transmission.astype(np.float64)
-        return self.illumination.facet_radiance(*surface, self.cell[sheets], self.camera, sheets)
+        look = color.astype(np.float64), transmission.astype(np.float64), self.cell[sheets], sheets
+        return self.illumination.facet_radiance(Surfaces(_middles(corners), normal, *look), self.camera)
 
 
 def at_vertices(values: NDArray[np.floating], corner_verts: NDArray, offsets: NDArray, vertices: int) -> NDArray:
@@ -516,13 +470,12 @@ def baked_light(
 
     All that is drawn as facets or polygons is in ``made``. Without ``facets``, proxies are clouds in the light instead.
     """
-    corners, cell = made.corners(), cell_of_node(refinement)
+    corners, cell = made.corners(), numbers_of(refinement, refinement.nodes)
     replaced = ~np.isin(refinement.decision, (Decision.PROXY, Decision.HIDDEN)) | facets
     replaced &= len(corners) > 0
-    clouds = MediumCells.of(flora, refinement, ~replaced)
+    clouds = MediumCells.of(flora, refinement, refinement.nodes, ~replaced)
     inside = np.full(len(corners), -1, np.int64)
-    for start in range(0, len(corners), BATCH):
-        part = slice(start, start + BATCH)
+    for part in blocks(len(corners), BATCH):
         inside[part] = cell[refinement.tree.locate(_middles(corners[part].astype(np.float64)))]
     # A leaf that reaches out of all tetrahedra that hold something has no cell; it shadows like the others.
     sheets = replace(SurfaceElements.of(corners, inside, len(clouds)), replaced=replaced)
@@ -536,6 +489,5 @@ def baked_light(
             away = np.linalg.norm(corners[:, 0] - camera.eye, axis=1)
             radii = (fraction * away.max() for fraction in NEAR_FRACTIONS)
             near = Near(camera.eye, tuple(r for r in radii if (away < r).sum() >= NEAR_SHEETS))
-    scene = sources.lights, sources.world, sources.occluders
-    found = yield from shadow_steps(clouds, *scene, resolution, sources.ground, sheets=sheets, near=near)
+    found = yield from shadow_steps(clouds, sources, resolution, sheets, near)
     return BakedLight(found, inside, camera)

@@ -44,7 +44,7 @@ from ..species.ages import ages_of, with_age
 from ..species.species import Species
 from ..storage import cached
 from ..subplants.pieces import Pieces, open_subplants
-from .microsurfaces import CIRCUMRADIUS, SIN_60, Facets, by_number, piece_facets, subplant_facets
+from .microsurfaces import CIRCUMRADIUS, SIN_60, FacetRules, Facets, by_number, piece_facets, subplant_facets
 
 #: Weights of the shipped species, made by ``python -m devtools.facet_tables``. Raise `_METHOD` when facets or weights
 #: are made differently.
@@ -108,7 +108,6 @@ def _with_share(tables: Floats, row: Integers, count: Floats, share: Floats | No
 
 #: Weights (2, r, k) of other species by digest: a scene is compiled anew for each refinement.
 _found: dict[str, Floats] = {}
-_REMEMBERED = 256
 
 
 def facet_weights(flora: Flora, species: Collection[int] | None = None) -> FacetWeights:
@@ -117,6 +116,7 @@ def facet_weights(flora: Flora, species: Collection[int] | None = None) -> Facet
     Those of the shipped species are read from `TABLE`. Others take a second or two each, and are cached on disk too.
     """
     every = sorted(set(range(len(flora.species)) if species is None else species))
+    run_to_end(measuring(flora, every))
     return _of_states(flora.in_leaf, tuple((number, states_of(flora, number)) for number in every))
 
 
@@ -125,21 +125,14 @@ def _of_states(flora: Flora, species: tuple[tuple[int, tuple[int, ...]], ...]) -
     number = 1 + max((state for _, states in species for state in states), default=0)
     weights = np.ones((2, number, len(flora.rows), len(COUNTS)))
     for one, states in species:
-        found = weights_of(flora, one, states, _found_of)
+        found = weights_of(flora, one, states, _known)
         weights[:, : found.shape[1], flora.rows["species"] == one] = found
     return FacetWeights(*weights, are_solids(flora.rows))
 
 
-def _found_of(flora: Flora, number: int) -> Floats:
-    """Weights (2, r, k) of one species, measured if need be."""
-    run_to_end(_measuring(flora, number))
-    return _known(flora, number)
-
-
 def unmeasured(flora: Flora) -> list[int]:
     """Species (index) whose weights, as of the day of the flora, nobody has measured yet."""
-    every = range(len(flora.species))
-    return [n for n in every if any(_known(*variant) is None for variant in needed(flora, n))]
+    return [n for n in range(len(flora.species)) if any(_known(*variant) is None for variant in needed(flora, n))]
 
 
 def measuring(flora: Flora, species: Collection[int]) -> Generator[tuple[str, float], None, None]:
@@ -150,21 +143,13 @@ def measuring(flora: Flora, species: Collection[int]) -> Generator[tuple[str, fl
     str, float
         Name of the species at work, and the fraction of its measurement that is done.
     """
-    for number in sorted(set(species) & set(unmeasured(flora))):
-        every = needed(flora, number)
-        for i, variant in enumerate(every):
-            for name, done in _measuring(*variant):
-                yield name, (i + done) / len(every)
-
-
-def _measuring(flora: Flora, number: int) -> Generator[tuple[str, float], None, None]:
-    """Measure the weights of one species, unless they are known."""
-    if _known(flora, number) is not None:
-        return
-    name = flora.species[number].name
-    found = yield from mapped(fitting(flora, number, RAYS), lambda done: (name, done))
-    content = digest(flora, number)
-    _keep(content, cached(_KIND, content, found.shape, lambda: found))
+    for number in sorted(set(species)):
+        left = [variant for variant in needed(flora, number) if _known(*variant) is None]
+        for i, (own, one) in enumerate(left):
+            name, content = own.species[one].name, digest(own, one)
+            steps = fitting(own, one, RAYS)
+            found = yield from mapped(steps, lambda done, i=i, name=name, left=left: (name, (i + done) / len(left)))
+            _found[content] = cached(_KIND, content, found.shape, lambda found=found: found)
 
 
 def _known(flora: Flora, number: int) -> Floats | None:
@@ -175,21 +160,11 @@ def _known(flora: Flora, number: int) -> Floats | None:
         return table.astype(np.float64)
     if name not in _found:
         rows = int((flora.rows["species"] == number).sum())
-        try:
-            _keep(name, cached(_KIND, name, (2, rows, len(COUNTS)), _unknown))
-        except LookupError:
+        stored = cached(_KIND, name, (2, rows, len(COUNTS)), lambda: None)
+        if stored is None:
             return None
+        _found[name] = stored
     return _found[name]
-
-
-def _unknown() -> Floats:
-    raise LookupError("not measured yet")
-
-
-def _keep(name: str, found: Floats) -> None:
-    if len(_found) >= _REMEMBERED:
-        _found.clear()
-    _found[name] = found
 
 
 def digest(flora: Flora, number: int) -> str:
@@ -396,13 +371,13 @@ class SiblingGroups:
         """Facets of a side in meters for several copies of all side by side, each copy with other facets."""
         if self.pieces is None:
             several = Branches.concatenate([self._copy(self.some, n) for n in range(copies)])
-            return subplant_facets(self.flora, several, np.full(len(several), side))
+            return subplant_facets(self.flora, several, FacetRules(np.full(len(several), side)))
         several = []
         for n in range(copies):
             start, end = (place + n * self.beyond for place in (self.pieces.start, self.pieces.end))
             several.append(replace(self.pieces, branches=self._copy(self.pieces.branches, n), start=start, end=end))
         pieces = Pieces.concatenate(several)
-        return piece_facets(self.flora, pieces, np.full(len(pieces), side))
+        return piece_facets(self.flora, pieces, FacetRules(np.full(len(pieces), side)))
 
     def _copy(self, branches: Branches, number: int) -> Branches:
         key = mix(branches.key + np.uint64(number + 1))
@@ -542,17 +517,14 @@ def ages_measured(species: Species) -> list[float]:
 
 def needed(flora: Flora, number: int) -> list[tuple[Flora, int]]:
     """What has to be known for the weights of a species of a flora on its day, in summer or not."""
-    plain, states = flora.in_leaf, states_of(flora, number)
-    own = plain.species[number]
-    if own.aged is None:
-        return [(plain, number) if s == 0 else (_with_leaves(own, SHARES[s]), 0) for s in states]
-    described, years = own.aged
-    around, _ = _around(described, years)
-    out = [(_at_age(described, one), 0) for one in around]
-    if states != (0,):
-        full = _at_age(described, 0.0)
-        out += [(_with_leaves(full.species[0], SHARES[s]), 0) for s in {0, *states}]
-    return out
+    asked: dict[tuple[Flora, int], None] = {}
+
+    def known(some: Flora, one: int) -> Floats:
+        asked[some, one] = None
+        return np.ones((2, int((some.rows["species"] == one).sum()), len(COUNTS)))
+
+    weights_of(flora.in_leaf, number, states_of(flora, number), known)
+    return list(asked)
 
 
 def weights_of(flora: Flora, number: int, states: tuple[int, ...], known: Known) -> Floats:
@@ -569,15 +541,13 @@ def weights_of(flora: Flora, number: int, states: tuple[int, ...], known: Known)
     known : callable
         What was measured of those that are `needed`.
     """
-    own, last = flora.species[number], max(states)
+    own, rows = flora.species[number], flora.rows[flora.rows["species"] == number]
+    out = np.ones((2, max(states) + 1, len(rows), len(COUNTS)))
     if own.aged is None:
-        found = [known(flora, number) if s == 0 else known(_with_leaves(own, SHARES[s]), 0) for s in states]
-        out = np.ones((2, last + 1, *found[0].shape[1:]))
-        for state, one in zip(states, found, strict=True):
-            out[:, state] = one
+        for state in states:
+            out[:, state] = known(flora, number) if state == 0 else known(_with_leaves(own, SHARES[state]), 0)
         return out
     described, years = own.aged
-    rows = flora.rows[flora.rows["species"] == number]
 
     def inverse(some: Flora) -> Floats:
         return 1.0 / np.clip(known(some, 0)[:, _alike(rows, some.rows)], _LOWEST_WEIGHT, _HIGHEST_WEIGHT)
@@ -585,12 +555,9 @@ def weights_of(flora: Flora, number: int, states: tuple[int, ...], known: Known)
     around, place = _around(described, years)
     ends = [inverse(_at_age(described, one)) for one in around]
     grown = ends[0] + place * (ends[-1] - ends[0])
-    out = np.ones((2, last + 1, *grown.shape[1:]))
+    out[:, 0] = 1.0 / grown if 0 in states else 1.0
     full = _at_age(described, 0.0)
-    for state in states:
-        if state == 0:
-            out[:, 0] = 1.0 / grown
-            continue
+    for state in sorted({*states} - {0}):
         # Leaves that are gone change as much of what hides behind others as when the plant is full-grown.
         all_leaves, some = inverse(full), inverse(_with_leaves(full.species[0], SHARES[state]))
         hidden = np.maximum(all_leaves - 1.0, 0.05)

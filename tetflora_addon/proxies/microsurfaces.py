@@ -14,6 +14,7 @@ in the plane of a leaf's own axes made beeches a quarter too bright from above.
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import lru_cache
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,7 +24,7 @@ from ..assets.asset import COUNTS
 from ..compiled.flora import Flora, placed_samples
 from ..compiled.samples import Points
 from ..growth.axes import axes
-from ..growth.foliage import leaf_start, outwardness, place_leaves, settled, youth
+from ..growth.foliage import Leaves, leaf_start, outwardness, place_leaves, settled, youth
 from ..growth.growth import WholeBranches
 from ..growth.hashing import Draw, child_key, mix, signed, uniform
 from ..growth.seasons import AREA, PRESENT, leaf_colors_at, leaf_stages, mean_leaf_colors
@@ -76,99 +77,99 @@ class Facets(Arrays):
         return np.cross(self.across, self.along)
 
 
-def subplant_facets(
-    flora: Flora,
-    subplants: Branches,
-    leaf_side: Floats,
-    wood_side: Floats | None = None,
-    weight: Floats | None = None,
-    explicit: Floats | None = None,
-    lit: LightRatios | None = None,
-    thin: Thin | None = None,
-) -> Facets:
-    """Facets of sub-plants.
+@dataclass(frozen=True)
+class FacetRules(Arrays):
+    """How facets of things (n) are made: sub-plants, or pieces of branches."""
 
-    Parameters
-    ----------
-    flora : Flora
-    subplants : Branches of n
-    leaf_side, wood_side : (n,) float64
-        Side of a facet for leaves and for wood (the same if not given), meters; facets for leaves are never smaller
-        than the leaves.
-    weight : (n,) float64, optional
-        Fraction of their area that facets get, see `facet_weights`.
-    explicit : (n,) float64, optional
-        Fraction of each sub-plant that is drawn as it is; as many of its facets are left out at random.
-    lit : LightRatios of n, optional
-    thin : Thin, optional
-    """
-    part = np.ones(len(subplants)) if weight is None else weight
-    wood_side = leaf_side if wood_side is None else wood_side
-    leaves = _leaves_of_subplants(flora, subplants, leaf_side, part, explicit, lit, thin)
-    made = _joined([leaves, _wood_of_subplants(flora, subplants, wood_side, part, explicit, thin)])
-    return made if subplants.crown is None else made.take(np.flatnonzero(made.side > 0))
+    leaf: Floats  # (n,): side of a facet for leaves, meters; facets for leaves are never smaller than the leaves
+    wood: Floats | None = None  # (n,): the same for wood; None where it is the same
+    weight: Floats | None = None  # (n,): fraction of their area that facets get, see `facet_weights`; None for all
+    #: (n,): fraction of each that is drawn as it is; as many of its facets are left out at random. Of pieces that of
+    #: their leaves alone.
+    explicit: Floats | None = None
+    lit: LightRatios | None = None  # of n
+    thin: Thin | None = None
+
+    @property
+    def wood_side(self) -> Floats:
+        """`wood`, known."""
+        return self.leaf if self.wood is None else self.wood
+
+    def weights(self, owner: Integers) -> Floats:
+        """`weight` of some (m,), known."""
+        return np.ones(len(owner)) if self.weight is None else self.weight[owner]
+
+
+@dataclass(frozen=True)
+class FacetSites(Arrays):
+    """Facets (m) to be made of things, and what is known of each so far; the rest is None."""
+
+    owner: Integers  # (m,): thing that each is of
+    index: Integers  # (m,): its number there
+    key: Keys  # (m,)
+    area: Floats  # (m,): m²
+    row: Integers | None = None  # (m,): of the branch that bears it
+    center: Floats | None = None  # (m, 3): meters
+    frame: Floats | None = None  # (m, 3, 3): axes of its leaf, or of the sub-plant
+    sample: Integers | None = None  # (m,): that it lies at
+    t: Floats | None = None  # (m,): place along the branch that bears it, 0 to 1
+    leaves: Leaves | None = None  # of m
+
+    def thinned(self, thin: Thin | None, longer: float = 1.0) -> Self:
+        """Those that are worth making, which stand for the others, if facets are so many times as long."""
+        if thin is None:
+            return self
+        kept, times = thin(self.key, self.center, longer * CIRCUMRADIUS * np.sqrt(self.area))
+        some = self.take(kept)
+        return replace(some, area=times * some.area)
+
+
+def subplant_facets(flora: Flora, subplants: Branches, rules: FacetRules) -> Facets:
+    """Facets of sub-plants (n), by rules of n."""
+    leaves, wood = _leaves_of_subplants(flora, subplants, rules), _wood_of_subplants(flora, subplants, rules)
+    made = Facets.concatenate([leaves, wood])
+    return made.take(made.side > 0)
 
 
 def piece_facets(
-    flora: Flora,
-    pieces: Pieces,
-    leaf_side: Floats,
-    wood_side: Floats | None = None,
-    weight: Floats | None = None,
-    explicit: Floats | None = None,
-    lit: LightRatios | None = None,
-    thin: Thin | None = None,
-    whole: tuple[WholeBranches, Integers] | None = None,
+    flora: Flora, pieces: Pieces, rules: FacetRules, whole: tuple[WholeBranches, Integers] | None = None
 ) -> Facets:
-    """Facets of pieces of branches; parameters as for `subplant_facets`.
+    """Facets of pieces (n) of branches, by rules of n.
 
-    Here ``explicit`` is the fraction of the leaves. Where whole branches are given, and that (n,) of each piece, their
-    wood is drawn as it is.
+    Where whole branches are given, and that (n,) of each piece, their wood is drawn as it is.
     """
-    part = np.ones(len(pieces)) if weight is None else weight
-    made = [_leaves_of_pieces(flora, pieces, leaf_side, part, explicit, lit, thin, whole)]
-    if whole is None:
-        made.append(_wood_of_pieces(flora, pieces, leaf_side if wood_side is None else wood_side, part))
-    return _joined(made)
+    leaves = _leaves_of_pieces(flora, pieces, rules, whole)
+    return leaves if whole is not None else Facets.concatenate([leaves, _wood_of_pieces(flora, pieces, rules)])
 
 
-def _joined(parts: list[Facets]) -> Facets:
-    """Facets of leaves and wood as one."""
-    return Facets.concatenate([p if p.stretch is not None else replace(p, stretch=np.ones(len(p))) for p in parts])
-
-
-def pushed_outside_view(facets: Facets, distance_to_view: Callable[[NDArray], NDArray], within: bool = False) -> Facets:
+def pushed_outside_view(facets: Facets, distance_to_view: Callable[[NDArray], NDArray]) -> Facets:
     """Facets that are out of view, moved away from it where they would reach into it, so that they keep their area.
 
     Long ones are shorter and wider there. Where there is no room beside it, they are shrunk, or left out.
-    ``distance_to_view`` gives the distance (n,) of points (n, 3) from the view in meters. With ``within``, facets whose
-    middle is in the view stay as they are.
+    ``distance_to_view`` gives the distance (n,) of points (n, 3) from the view in meters.
     """
     reach, center = CIRCUMRADIUS * facets.side, facets.center
     away = distance_to_view(center)
     if facets.stretch is not None:
-        fits = np.maximum(np.minimum(facets.stretch, away / np.maximum(reach, 1e-12)), 1.0)
-        facets = replace(facets, stretch=np.where((away <= 0.0) & within, facets.stretch, fits))
-    stay = (away <= 0.0) & within
+        fits = np.minimum(facets.stretch, away / np.maximum(reach, 1e-12))
+        facets = replace(facets, stretch=np.maximum(fits, 1.0))
     short = reach - away
-    some = np.flatnonzero((short > 0.0) & (short < _MOST_MOVED * reach) & ~stay)
+    some = np.flatnonzero((short > 0.0) & (short < _MOST_MOVED * reach))
     if len(some):
         here, step = center[some], 0.1 * reach[some, None]
-        slope = (
-            np.stack([distance_to_view(here + step * axis) - distance_to_view(here) for axis in np.eye(3)], axis=1)
-            / step
-        )
+        slope = [distance_to_view(here + step * axis) - distance_to_view(here) for axis in np.eye(3)]
+        slope = np.stack(slope, axis=1) / step
         steep = np.maximum(np.einsum("ni,ni->n", slope, slope), _LEAST_SLOPE)
         center = center.copy()
         center[some] += (short[some] / steep)[:, None] * slope
-    fraction = np.where(stay, 1.0, np.clip(distance_to_view(center) / np.maximum(reach, 1e-12), 0.0, 1.0))
+    fraction = np.clip(distance_to_view(center) / np.maximum(reach, 1e-12), 0.0, 1.0)
     return replace(facets, center=center, side=facets.side * fraction).take(np.flatnonzero(fraction > 0.0))
 
 
-def facet_numbers(
-    key: NDArray, area: NDArray, facet: NDArray, path: int, draw: int, explicit: NDArray | None = None
-) -> tuple[NDArray, NDArray, NDArray, NDArray]:
-    """Owner, index, key and area of the facets that areas (n,) are cut into; their expected number is area / facet.
+def facet_sites(
+    key: Keys, area: Floats, facet: Floats, path: int, draw: int, explicit: Floats | None = None
+) -> FacetSites:
+    """Facets that areas (n,) are cut into, by the area (n,) of one; their expected number is area / facet.
 
     From 1 on they divide the area evenly; below, one facet stands for several sub-plants. Facets are left out by the
     fraction (n,) of their owner that is real.
@@ -177,11 +178,10 @@ def facet_numbers(
     counts = np.floor(expected + uniform(key, draw)).astype(np.int64)
     owner, index = spread(counts)
     one = facet * np.where(expected >= 1.0, expected / np.maximum(counts, 1), 1.0)
-    own = child_key(key[owner], index + path)
+    every = FacetSites(owner, index, child_key(key[owner], index + path), one[owner])
     if explicit is None or not explicit.any():
-        return owner, index, own, one[owner]
-    kept = np.flatnonzero(uniform(own, Draw.TRANSITION) >= explicit[owner])
-    return owner[kept], index[kept], own[kept], one[owner[kept]]
+        return every
+    return every.take(np.flatnonzero(uniform(every.key, Draw.TRANSITION) >= explicit[owner]))
 
 
 def _in_a_face(flora: Flora, row: NDArray, key: Keys, frame: NDArray) -> tuple[NDArray, NDArray]:
@@ -197,20 +197,18 @@ def _in_a_face(flora: Flora, row: NDArray, key: Keys, frame: NDArray) -> tuple[N
     return across, along
 
 
-def _picked(
-    flora: Flora, points: Points, subplants: Branches, owner: NDArray, index: NDArray, key: NDArray, area: NDArray
-) -> tuple[Integers, Floats, Floats, Floats]:
-    """Samples (m,) for facets, their places (m, 3), rotations (m, 3, 3) from their axes to the world, and areas (m,).
+def _at_samples(flora: Flora, points: Points, subplants: Branches, made: FacetSites) -> FacetSites:
+    """Facets of sub-plants at samples: their places, and the axes of the sub-plants.
 
     Runs of samples are spread over a sub-plant, and each starts its run elsewhere. Where there are more facets than
     samples, none may lie upon another: whole plants are turned about their trunk, which gives an equally likely plant;
     in others places are moved a little.
     """
     first, number = points.runs(subplants)
-    start = (uniform(subplants.key, _START) * number).astype(np.int64)
-    pick = first[owner] + (start[owner] + index) % number[owner]
+    owner, start = made.owner, (uniform(subplants.key, _START) * number).astype(np.int64)
+    pick = first[owner] + (start[owner] + made.index) % number[owner]
     base = gathered(subplants.frame, owner)
-    again = index // number[owner]
+    again = made.index // number[owner]
     whole = ((flora.rows["order"] == 0) & ~flora.rows["phantom"])[subplants.row]
     turn = None if subplants.crown is None else again * whole[owner] * GOLDEN_ANGLE
     place, share = placed_samples(flora, points, subplants, owner, pick, turn)
@@ -218,10 +216,11 @@ def _picked(
     if again.any():
         _turned(base, again, np.flatnonzero((again > 0) & whole[owner]))
         moved = np.flatnonzero((again > 0) & ~whole[owner])
-        place[moved] += _MOVED * np.stack([signed(key[moved], _MOVE + axis) for axis in range(3)], axis=1)
+        place[moved] += _MOVED * np.stack([signed(made.key[moved], _MOVE + axis) for axis in range(3)], axis=1)
     along = sum(base[:, :, k] * place[:, k, None] for k in range(3))
     place = gathered(subplants.position, owner) + subplants.length[owner, None] * along
-    return pick, place, base, area if share is None else area * share
+    area = made.area if share is None else made.area * share
+    return replace(made, area=area, row=points.row[pick], center=place, frame=base, sample=pick)
 
 
 def _turned(base: Floats, again: Integers, some: Integers) -> None:
@@ -232,50 +231,50 @@ def _turned(base: Floats, again: Integers, some: Integers) -> None:
     base[some, :, 0], base[some, :, 1] = c * x + s * y, c * y - s * x
 
 
-def _leaves_of_subplants(
-    flora: Flora,
-    subplants: Branches,
-    side: NDArray,
-    weight: NDArray,
-    explicit: NDArray | None,
-    lit: LightRatios | None,
-    thin: Thin | None,
-) -> Facets:
+def _leaves_of_subplants(flora: Flora, subplants: Branches, rules: FacetRules) -> Facets:
     rows, points = flora.rows, flora.samples.leaves
     one, all_ = flora.one_leaf_area(subplants), flora.leaf_areas(subplants)
-    facet = np.maximum(side**2, one)
-    owner, index, key, area = facet_numbers(subplants.key, all_, facet, _FACET_PATH, _LEAF_COUNT, explicit)
-    pick, place, base, area = _picked(flora, points, subplants, owner, index, key, area)
-    leaf_row = points.row[pick]
-    frame = products(base, gathered(points.frame, pick).astype(np.float64))
-    frame = settled(rows, leaf_row, frame, points.light[pick].astype(np.float64), _SKY)
-    half_leaf = 0.5 * rows["leaf_size"][leaf_row, 0] * subplants.scale[owner]
-    center = place + half_leaf[:, None] * frame[:, :, 1]
-    if thin is not None:
-        kept, times = thin(key, center, _reach(area))
-        owner, key, pick, leaf_row, center, frame = (
-            gathered(of, kept) for of in (owner, key, pick, leaf_row, center, frame)
-        )
-        area = times * area[kept]
-    across, along = _in_a_face(flora, leaf_row, key, frame)
+    facet = np.maximum(rules.leaf**2, one)
+    made = facet_sites(subplants.key, all_, facet, _FACET_PATH, _LEAF_COUNT, rules.explicit)
+    made = _at_samples(flora, points, subplants, made)
+    frame = products(made.frame, gathered(points.frame, made.sample).astype(np.float64))
+    frame = settled(rows, made.row, frame, points.light[made.sample].astype(np.float64), _SKY)
+    half_leaf = 0.5 * rows["leaf_size"][made.row, 0] * subplants.scale[made.owner]
+    made = replace(made, center=made.center + half_leaf[:, None] * frame[:, :, 1], frame=frame).thinned(rules.thin)
+    owner = made.owner
     # Sub-plants beyond the limbs know how far outside they are, which holds for all that grows on them.
-    outward = np.where(rows["outward"][subplants.row[owner]], points.outward[pick], subplants.outward[owner])
-    many = area / one.clip(1e-300)[owner]
-    day = None if subplants.year is None else (subplants, owner)
-    color = leaf_colors_of_facets(flora, leaf_row, key, many, outward, points.young[pick], day)
-    of_day = None if day is None else _of_kinds(flora, subplants, owner, rows["leaf_kind"][leaf_row])
-    color = facet_albedo(color, owner, weight, _gloss(flora, leaf_row))
-    made = Facets(
-        center,
-        across,
-        along,
-        np.sqrt(area * weight[owner] if of_day is None else area * weight[owner] * of_day),
-        color if lit is None else lit.colors(color, owner, np.cross(across, along), many),
-        flora.leaf.transmission[leaf_row],
-        _carried(flora, subplants, owner, center),
-        dull=_dull(flora, leaf_row, owner, weight, lit),
-    )
-    return made if of_day is None else made.take(np.flatnonzero(of_day > 0))
+    outward = np.where(rows["outward"][subplants.row[owner]], points.outward[made.sample], subplants.outward[owner])
+    places = outward, points.young[made.sample]
+    found = _leaf_facets(flora, subplants, made, rules, one, places, _carried(flora, subplants, made))
+    of_day = None if subplants.year is None else _of_kinds(flora, subplants, owner, rows["leaf_kind"][made.row])
+    return found if of_day is None else replace(found, side=found.side * np.sqrt(of_day))
+
+
+def _leaf_facets(
+    flora: Flora,
+    branches: Branches,
+    made: FacetSites,
+    rules: FacetRules,
+    one: Floats,
+    places: tuple[Floats, Floats],
+    velocity: Floats | None,
+) -> Facets:
+    """Facets at sites (m) at leaves of branches (n).
+
+    A leaf of these has an area ``one`` (n,), m²; ``places`` (m,) are those between inside and outside and on the shoot.
+    """
+    row, owner = made.row, made.owner
+    across, along = _in_a_face(flora, row, made.key, made.frame)
+    many = made.area / one.clip(1e-300)[owner]
+    weight, dull, lit = rules.weights(owner), flora.leaf.dull[row], rules.lit
+    color = cluster_color(_leaf_colors(flora, branches, made, many, *places), GLOSS * (1.0 - dull), weight)
+    if lit is not None:
+        color = lit.colors(color, owner, np.cross(across, along), many)
+    # What is mirrored and meets another leaf is lost as such.
+    left = np.minimum(weight if lit is None else weight * lit.hotspot[owner], 1.0)
+    side, stretch = np.sqrt(made.area * weight), np.ones(len(owner))
+    look = color, flora.leaf.transmission[row], velocity
+    return Facets(made.center, across, along, side, *look, stretch=stretch, dull=1.0 - left * (1.0 - dull))
 
 
 def _of_kinds(flora: Flora, subplants: Branches, owner: NDArray, kind: NDArray) -> Floats | None:
@@ -291,14 +290,7 @@ def _of_kinds(flora: Flora, subplants: Branches, owner: NDArray, kind: NDArray) 
 
 
 def _leaves_of_pieces(
-    flora: Flora,
-    pieces: Pieces,
-    side: NDArray,
-    weight: NDArray,
-    explicit: NDArray | None,
-    lit: LightRatios | None,
-    thin: Thin | None,
-    whole: tuple[WholeBranches, Integers] | None,
+    flora: Flora, pieces: Pieces, rules: FacetRules, whole: tuple[WholeBranches, Integers] | None
 ) -> Facets:
     branches, rows = pieces.branches, flora.rows
     row = branches.row
@@ -307,96 +299,66 @@ def _leaves_of_pieces(
     if branches.year is not None:
         shown, number = flora.day.left(branches, rows["leaf_kind"][row], AREA, PRESENT)
         one = one * shown / np.maximum(number, 1e-300)
-    facet = np.maximum(side**2, one)
+    facet, areas = np.maximum(rules.leaf**2, one), piece_leaves(flora, pieces)[1]
     start = leaf_start(rows, branches)
-    areas = piece_leaves(flora, pieces)[1]
-    owner, index, key, area, t = _along(flora, pieces, areas, facet, start, _FACET_PATH, _LEAF_COUNT, explicit)
+    made = _along(flora, pieces, areas, facet, start, _FACET_PATH, _LEAF_COUNT, rules.explicit)
     if whole is None:
-        bearers = np.flatnonzero(np.bincount(owner, minlength=len(branches)))  # many pieces get no facet
-        own, of = branches.take(bearers), np.searchsorted(bearers, owner)
+        bearers = np.flatnonzero(np.bincount(made.owner, minlength=len(branches)))  # many pieces get no facet
+        own, of = branches.take(bearers), np.searchsorted(bearers, made.owner)
         lines = axes(rows, own)
     else:
-        own, lines, of = whole[0].branches, whole[0].lines, whole[1][owner]
-    leaves = place_leaves(rows, own, lines, of, index, key, t)
-    frame = settled(rows, row[owner], leaves.frame, leaves.light, leaves.sky)
+        own, lines, of = whole[0].branches, whole[0].lines, whole[1][made.owner]
+    leaves = place_leaves(rows, own, lines, of, made.index, made.key, made.t)
+    frame = settled(rows, made.row, leaves.frame, leaves.light, leaves.sky)
     center = leaves.position + 0.5 * leaves.size[:, None] * frame[:, :, 1]
-    if thin is not None and not rows["envelope"][row].any():
-        kept, times = thin(key, center, _reach(area))
-        owner, index, key, t, center, frame = (gathered(of, kept) for of in (owner, index, key, t, center, frame))
-        leaves, area = leaves.take(kept), times * area[kept]
-    across, along = _in_a_face(flora, row[owner], key, frame)
-    places = outwardness(rows, branches, owner, t), youth(rows, row[owner], t)
-    many = area / one.clip(1e-300)[owner]
-    color = leaf_colors_of_facets(
-        flora, row[owner], key, many, *places, None if branches.year is None else (branches, owner)
-    )
-    color = facet_albedo(color, owner, weight, _gloss(flora, row[owner]))
-    if lit is not None:
-        color = lit.colors(color, owner, np.cross(across, along), many)
-    transmission = flora.leaf.transmission[row[owner]]
-    velocity = None
+    made = replace(made, center=center, frame=frame, leaves=leaves)
+    made = made.thinned(None if rows["envelope"][row].any() else rules.thin)
+    places, velocity = (outwardness(rows, branches, made.owner, made.t), youth(rows, made.row, made.t)), None
     if own.later is not None:
-        there = place_leaves(rows, own.moved(), lines.later, leaves.branch, index, key, t)
-        velocity = (there.position - leaves.position) / moment(rows)
-    side, dull = np.sqrt(area * weight[owner]), _dull(flora, row[owner], owner, weight, lit)
-    return Facets(center, across, along, side, color, transmission, velocity, dull=dull)
+        there = place_leaves(rows, own.moved(), lines.later, made.leaves.branch, made.index, made.key, made.t)
+        velocity = (there.position - made.leaves.position) / moment(rows)
+    return _leaf_facets(flora, branches, made, rules, one, places, velocity)
 
 
-def _wood_of_subplants(
-    flora: Flora, subplants: Branches, side: NDArray, weight: NDArray, explicit: NDArray | None, thin: Thin | None
-) -> Facets:
-    points = flora.samples.wood
-    wood = flora.wood_areas(subplants) / 2
-    owner, index, key, area = facet_numbers(subplants.key, wood, side**2, _WOOD_PATH, _WOOD_COUNT, explicit)
-    pick, center, base, area = _picked(flora, points, subplants, owner, index, key, area)
-    if thin is not None:
-        kept, times = thin(key, center, STRETCH * _reach(area))
-        owner, key, pick, center, base = (gathered(of, kept) for of in (owner, key, pick, center, base))
-        area = times * area[kept]
-    axis = np.einsum("nij,nj->ni", base, points.frame[pick, :, 2].astype(np.float64))
-    color = flora.rows["branch_color"][points.row[pick], 0]
-    velocity = _carried(flora, subplants, owner, center)
-    return _strips(center, axis, key, np.sqrt(area * weight[owner]), facet_albedo(color, owner, weight), velocity)
+def _wood_of_subplants(flora: Flora, subplants: Branches, rules: FacetRules) -> Facets:
+    points, wood = flora.samples.wood, flora.wood_areas(subplants) / 2
+    made = facet_sites(subplants.key, wood, rules.wood_side**2, _WOOD_PATH, _WOOD_COUNT, rules.explicit)
+    made = _at_samples(flora, points, subplants, made).thinned(rules.thin, STRETCH)
+    axis = np.einsum("nij,nj->ni", made.frame, points.frame[made.sample, :, 2].astype(np.float64))
+    return _strips(flora, made, rules, axis, _carried(flora, subplants, made))
 
 
-def _reach(area: Floats) -> Floats:
-    """Distance (n,) of the corners of facets of areas (n,) from their middle."""
-    return CIRCUMRADIUS * np.sqrt(area)
-
-
-def _wood_of_pieces(flora: Flora, pieces: Pieces, side: NDArray, weight: NDArray) -> Facets:
+def _wood_of_pieces(flora: Flora, pieces: Pieces, rules: FacetRules) -> Facets:
     none, wood = np.zeros(len(pieces)), wood_areas(flora, pieces) / 2
-    owner, _, key, area, t = _along(flora, pieces, wood, side**2, none, _WOOD_PATH, _WOOD_COUNT)
+    made = _along(flora, pieces, wood, rules.wood_side**2, none, _WOOD_PATH, _WOOD_COUNT)
+    owner, t, velocity = made.owner, made.t, None
     part = (t - pieces.t0[owner]) / np.maximum(pieces.t1 - pieces.t0, 1e-12)[owner]
     span = (pieces.end - pieces.start)[owner]
-    center, axis = pieces.start[owner] + part[:, None] * span, unit(span)
-    color = flora.rows["branch_color"][pieces.branches.row[owner], 0]
-    velocity = None
     if pieces.branches.later is not None:
         lines = axes(flora.rows, pieces.branches)
         velocity = (lines.later.at(owner, t)[0] - lines.at(owner, t)[0]) / moment(flora.rows)
-    return _strips(center, axis, key, np.sqrt(area * weight[owner]), facet_albedo(color, owner, weight), velocity)
+    made = replace(made, center=pieces.start[owner] + part[:, None] * span)
+    return _strips(flora, made, rules, unit(span), velocity)
 
 
-def _strips(
-    center: NDArray, axis: NDArray, key: Keys, side: NDArray, color: NDArray, velocity: NDArray | None
-) -> Facets:
-    """Facets of wood: long and thin, as branches are, along axes (n, 3)."""
-    stretch, none = np.full(len(side), STRETCH), np.zeros(len(side))
+def _strips(flora: Flora, made: FacetSites, rules: FacetRules, axis: Floats, velocity: Floats | None) -> Facets:
+    """Facets of wood: long and thin, as branches are, along axes (m, 3)."""
+    stretch, none = np.full(len(axis), STRETCH), np.zeros(len(axis))
     # Turned about their axes at random, since closed tubes face all ways around.
-    aside, turn = perpendicular(axis), 2 * np.pi * uniform(key, _TURN)[:, None]
-    across = np.cos(turn) * aside + np.sin(turn) * np.cross(axis, aside)
-    return Facets(center, across, axis, side, color, none, velocity, stretch=stretch, dull=none)
+    aside, turn = perpendicular(axis), 2 * np.pi * uniform(made.key, _TURN)[:, None]
+    across, weight = np.cos(turn) * aside + np.sin(turn) * np.cross(axis, aside), rules.weights(made.owner)
+    look = cluster_color(flora.rows["branch_color"][made.row, 0], none, weight), none, velocity
+    return Facets(made.center, across, axis, np.sqrt(made.area * weight), *look, stretch=stretch, dull=none)
 
 
-def _carried(flora: Flora, subplants: Branches, owner: Integers, center: Floats) -> Floats | None:
-    """Velocities (m, 3) of points (m, 3) of sub-plants that move with their bases; None for plants at rest."""
+def _carried(flora: Flora, subplants: Branches, made: FacetSites) -> Floats | None:
+    """Velocities (m, 3) of facets of sub-plants that move with their bases; None for plants at rest."""
     if subplants.later is None:
         return None
-    own = subplants.take(owner)
-    local = np.einsum("nji,nj->ni", own.frame, center - own.position)
+    own = subplants.take(made.owner)
+    local = np.einsum("nji,nj->ni", own.frame, made.center - own.position)
     there = own.later.position + np.einsum("nij,nj->ni", own.later.frame, local)
-    return (there - center) / moment(flora.rows)
+    return (there - made.center) / moment(flora.rows)
 
 
 def _along(
@@ -408,8 +370,8 @@ def _along(
     path: int,
     draw: int,
     explicit: Floats | None = None,
-) -> tuple[NDArray, NDArray, NDArray, NDArray, NDArray]:
-    """Owner, index, key, area and place along the branch of the facets of pieces, see `facet_numbers`.
+) -> FacetSites:
+    """Facets of pieces, and their places along the branch; see `facet_sites`.
 
     They are those of whole segments of branches, of which a piece has what lies on it: they do not depend on where a
     branch is cut. What they stand for begins at fractions ``start`` (n,) of the branches. Along a segment they follow
@@ -422,52 +384,27 @@ def _along(
     length = np.maximum(pieces.t1 - first, 0.0)
     part = np.where(length > 0, np.maximum(high - low, length) / np.maximum(length, 1e-12), 0.0)
     numbered = mix(pieces.branches.key ^ (number.astype(np.uint64) + np.uint64(path)))
-    owner, index, key, one = facet_numbers(numbered, area * part, facet, path, draw, explicit)
-    t = low[owner] + (high - low)[owner] * ((uniform(numbered, _PLACE)[owner] + index * _GOLDEN) % 1.0)
-    on = np.flatnonzero((t >= first[owner]) & (t < pieces.t1[owner]))
-    return owner[on], index[on], key[on], one[on], t[on]
+    made = facet_sites(numbered, area * part, facet, path, draw, explicit)
+    owner = made.owner
+    t = low[owner] + (high - low)[owner] * ((uniform(numbered, _PLACE)[owner] + made.index * _GOLDEN) % 1.0)
+    made = replace(made, t=t, row=pieces.branches.row[owner])
+    return made.take(np.flatnonzero((t >= first[owner]) & (t < pieces.t1[owner])))
 
 
-OnDay = tuple[Branches, Integers] | None
-
-
-def leaf_colors_of_facets(
-    flora: Flora, row: NDArray, key: NDArray, leaves: NDArray, outward: NDArray, young: NDArray, on_day: OnDay
+def _leaf_colors(
+    flora: Flora, branches: Branches, made: FacetSites, leaves: Floats, outward: Floats, young: Floats
 ) -> Floats:
-    """Colors of facets that stand for several leaves (n,) each: a mean varies less than the color of one leaf.
-
-    ``on_day`` are branches, and those (n,) whose leaves they are, where these may not be as in summer.
-    """
-    several = np.sqrt(np.maximum(leaves, 1))
-    deviation = signed(key, Draw.LEAF_COLOR) / several
+    """Colors (m, 3) of facets that stand for several leaves (m,) of branches each: a mean varies less than one leaf."""
+    several, row = np.sqrt(np.maximum(leaves, 1)), made.row
+    deviation = signed(made.key, Draw.LEAF_COLOR) / several
     mean = mean_leaf_colors(flora.rows, row, outward, young)
-    if on_day is not None:
-        branches, owner = on_day
-        summer, mean = mean, flora.day.own_colors(branches, flora.rows["leaf_kind"][row], mean, owner)
-        day, hue = (gathered(branches.year[:, i], owner) for i in range(2))
-        stages = leaf_stages(flora.rows, row, key, day)
+    if branches.year is not None:
+        summer, mean = mean, flora.day.own_colors(branches, flora.rows["leaf_kind"][row], mean, made.owner)
+        day, hue = (gathered(branches.year[:, i], made.owner) for i in range(2))
+        stages = leaf_stages(flora.rows, row, made.key, day)
         one = leaf_colors_at(flora.rows, row, summer, stages, hue)
         mean = mean + np.where(stages.there, 1.0 / several, 0.0)[:, None] * (one - mean)
     return np.clip(mean + gathered(flora.rows["leaf_color"][:, 1], row) * deviation[:, None], 0, 1)
-
-
-def facet_albedo(color: NDArray, owner: NDArray, weight: NDArray, gloss: Floats | None = None) -> Floats:
-    """Colors (m, 3) of facets of owners (m,), by the weights of these (n,).
-
-    ``gloss`` (m,) is that of leaves; wood has none.
-    """
-    return cluster_color(color, np.zeros(len(owner)) if gloss is None else gloss, weight[owner])
-
-
-def _dull(flora: Flora, row: NDArray, owner: NDArray, weight: NDArray, lit: LightRatios | None) -> Floats:
-    """Part (m,) of the gloss of leaves that facets lack: what is mirrored and meets another leaf is lost as such."""
-    left = np.minimum(weight if lit is None else weight * lit.hotspot, 1.0)
-    return 1.0 - left[owner] * (1.0 - flora.leaf.dull[row])
-
-
-def _gloss(flora: Flora, row: NDArray) -> Floats:
-    """Fraction (m,) of light that leaves of rows (m,) mirror."""
-    return GLOSS * (1.0 - flora.leaf.dull[row])
 
 
 #: Planes of each kind of leaf: quantiles of the areas of its faces.
@@ -538,34 +475,22 @@ def facets_of_assets(
     A fraction (n,) of them is left out.
     """
     weight = asset_weights(placed, parts, totals.optical_area / np.maximum(leaf, 1e-12) ** 2)
-    key = placed.keys(parts)
-    kinds = (
+    key, made = placed.keys(parts), []
+    for leafy, area, side, *draws in (
         (True, totals.leaf_area, leaf, _ASSET_LEAF_PATH, _ASSET_LEAF_COUNT),
         (False, totals.wood_area / 2, wood, _ASSET_WOOD_PATH, _ASSET_WOOD_COUNT),
-    )
-    made = []
-    for leafy, area, side, path, draw in kinds:
-        owner, index, own, one = facet_numbers(key, area, side**2, path, draw, left_out)
-        made.append(_placed(placed, parts, key, leafy, owner, index, own, np.sqrt(one * weight[owner]), weight[owner]))
+    ):
+        own = facet_sites(key, area, side**2, *draws, left_out)
+        sample = placed.picked(parts, key, leafy, own.owner, own.index)
+        made.append(_placed(placed, parts, replace(own, sample=sample), leafy, weight[own.owner]))
     return Facets.concatenate(made)
 
 
-def _placed(
-    placed: PlacedAssets,
-    parts: AssetParts,
-    part_key: NDArray[np.uint64],
-    leafy: bool,
-    owner: Integers,
-    index: Integers,
-    key: NDArray[np.uint64],
-    side: Floats,
-    weight: Floats,
-) -> Facets:
-    """Facets (m,) of clusters: each at a sample, turned about its normal as may be."""
+def _placed(placed: PlacedAssets, parts: AssetParts, made: FacetSites, leafy: bool, weight: Floats) -> Facets:
+    """Facets (m) of clusters: each at a sample, turned about its normal as may be."""
     samples, clusters = placed.assets.samples, placed.assets.clusters
-    pick = placed.picked(parts, part_key, leafy, owner, index)
-    instance = parts.instance[owner]
-    center = placed.to_world(samples.position[pick], instance)
+    pick, key, instance = made.sample, made.key, parts.instance[made.owner]
+    center, side = placed.to_world(samples.position[pick], instance), np.sqrt(made.area * weight)
     local = samples.normal[pick].astype(np.float64)
     linear, some = placed.instances.linear, placed.stretched[instance]
     normal = np.zeros_like(center)
@@ -576,9 +501,8 @@ def _placed(
         at = np.flatnonzero(some)
         normal[at] = np.einsum("nij,nj->ni", placed.cofactors(instance[at]), local[at])
         # Faces of one cluster grow by different factors, and so do their facets.
-        cluster = parts.cluster[owner[at]]
-        mean = parts.totals.area[owner[at]] / (clusters.leaf_area[cluster] + clusters.wood_area[cluster])
-        side = side.copy()
+        owner, cluster = made.owner[at], parts.cluster[made.owner[at]]
+        mean = parts.totals.area[owner] / (clusters.leaf_area[cluster] + clusters.wood_area[cluster])
         side[at] *= np.sqrt(np.linalg.norm(normal[at], axis=1) / mean)
     normal = unit(normal)
     across = perpendicular(normal)
@@ -587,11 +511,12 @@ def _placed(
     along = np.cross(normal, across)
     # Where there are more facets than samples, none may lie upon another.
     number = (clusters.leaf_samples if leafy else clusters.wood_samples)[parts.cluster]
-    again = np.flatnonzero(index >= number[owner])
+    again = np.flatnonzero(made.index >= number[made.owner])
     if len(again):
         for axis, by in ((across, _ASSET_MOVE), (along, _ASSET_MOVE + 1)):
             center[again] += (_ASSET_MOVED * side[again] * signed(key[again], by))[:, None] * axis[again]
-    color = recollision_albedo(samples.color[pick].astype(np.float64), weight)
-    through, rough = (own[pick].astype(np.float64) for own in (samples.transmission, samples.roughness))
-    dull = 1.0 - np.clip(weight, 0.0, 1.0)
-    return Facets(center, across, along, side, color, through, roughness=rough, dull=dull)
+    color, through, rough = (
+        of[pick].astype(np.float64) for of in (samples.color, samples.transmission, samples.roughness)
+    )
+    look = recollision_albedo(color, weight), through
+    return Facets(center, across, along, side, *look, roughness=rough, dull=1.0 - np.clip(weight, 0.0, 1.0))

@@ -30,35 +30,22 @@ SKYLIGHT = 0.2
 
 
 @dataclass(frozen=True)
-class Triangles(Arrays):
-    """Equilateral triangles."""
+class DrawnShapes(Arrays):
+    """Equilateral triangles, or spheres."""
 
-    corners: Floats32  # (n, 3, 3): world space, meters
+    place: Floats32  # (n, 3, 3): corners of triangles, or (n, 3): centers of spheres; world space, meters
     color: Floats32  # (n, 3)
     transmission: Floats32  # (n,)
-    velocity: Floats32 | None = None  # (n, 3): meters a second; None for plants at rest
-    #: roughness and dull, (n,): as of facets.
-    roughness: Floats32 | None = None
-    dull: Floats32 | None = None
-
-
-@dataclass(frozen=True)
-class Spheres(Arrays):
-    """Spheres."""
-
-    center: Floats32  # (n, 3): world space, meters
-    radius: Floats32  # (n,)
-    color: Floats32  # (n, 3)
-    transmission: Floats32  # (n,)
-    #: velocity, roughness and dull, (n, 3) or None, (n,) float32 or None, (n,) float32: as of triangles.
+    #: velocity, roughness and dull, (n, 3), (n,) and (n,): as of facets.
     velocity: Floats32 | None = None
     roughness: Floats32 | None = None
     dull: Floats32 | None = None
+    radius: Floats32 | None = None  # (n,): of spheres, meters; None for triangles
 
 
 #: Facets, or what is drawn in their place.
-Primitive = Facets | Triangles | Spheres
-_Drawn = TypeVar("_Drawn", Facets, Triangles, Spheres)
+Primitive = Facets | DrawnShapes
+_Drawn = TypeVar("_Drawn", Facets, DrawnShapes)
 
 
 def triangle_corners(facets: Facets) -> Floats32:
@@ -70,15 +57,15 @@ def triangle_corners(facets: Facets) -> Floats32:
     return np.stack([c.astype(np.float32) for c in corners], 1)
 
 
-def triangles_of(facets: Facets) -> Triangles:
+def triangles_of(facets: Facets) -> DrawnShapes:
     """A triangle for each facet.
 
     Triangles take half of a renderer's memory and time for squares of the same area.
     """
-    return Triangles(triangle_corners(facets), *_shaded(facets))
+    return DrawnShapes(triangle_corners(facets), *_shaded(facets))
 
 
-def spheres_of(facets: Facets, camera: Camera | None, disc: float = np.pi, sun: Floats | None = None) -> Spheres:
+def spheres_of(facets: Facets, camera: Camera | None, disc: float = np.pi, sun: Floats | None = None) -> DrawnShapes:
     """A sphere for each facet.
 
     Parameters
@@ -94,7 +81,7 @@ def spheres_of(facets: Facets, camera: Camera | None, disc: float = np.pi, sun: 
     """
     cover = cover_for_light(facets, sun) if camera is None else np.maximum(facing(facets, camera), LEAST_COVER)
     radius = facets.side * np.sqrt(cover / disc)
-    return Spheres(facets.center.astype(np.float32), radius.astype(np.float32), *_shaded(facets))
+    return DrawnShapes(facets.center.astype(np.float32), *_shaded(facets), radius.astype(np.float32))
 
 
 def joined(parts: Sequence[_Drawn]) -> _Drawn:
@@ -107,40 +94,30 @@ def joined(parts: Sequence[_Drawn]) -> _Drawn:
     return type(parts[0]).concatenate(parts)
 
 
-def triangle_mesh(triangles: Triangles) -> MeshBuffers:
-    """Triangles as a mesh with the attributes that the material of proxies reads."""
-    n = len(triangles)
+def shape_buffers(shapes: DrawnShapes) -> MeshBuffers | PointBuffers:
+    """A mesh of triangles, or spheres as points, with the attributes that the material of proxies reads."""
+    names = ("color", "transmission", "roughness", "dull")
+    looks = {f"tf_{name}": own for name in names if (own := getattr(shapes, name)) is not None}
+    if shapes.radius is not None:
+        still = shapes.velocity is None
+        return PointBuffers(shapes.place, shapes.radius, looks if still else {**looks, "velocity": shapes.velocity})
+    n, attributes = len(shapes), {name: ("FACE", values) for name, values in looks.items()}
     every = np.arange(3 * n, dtype=np.int32).reshape(n, 3)
-    more = {name: ("FACE", values) for name, values in _mirrored(triangles).items()}
-    if triangles.velocity is not None:
-        more["velocity"] = "POINT", np.repeat(triangles.velocity, 3, axis=0)
+    if shapes.velocity is not None:
+        attributes["velocity"] = "POINT", np.repeat(shapes.velocity, 3, axis=0)
     return MeshBuffers(
-        positions=triangles.corners.reshape(-1, 3),
+        positions=shapes.place.reshape(-1, 3),
         edge_verts=np.stack([every, np.roll(every, -1, axis=1)], axis=2).reshape(-1, 2),
         corner_verts=every.ravel(),
         corner_edges=every.ravel().copy(),
         face_offsets=np.arange(n + 1, dtype=np.int32) * np.int32(3),
-        attributes={"tf_color": ("FACE", triangles.color), "tf_transmission": ("FACE", triangles.transmission), **more},
-    )
-
-
-def sphere_points(spheres: Spheres) -> PointBuffers:
-    """Spheres as points with the attributes that the material of proxies reads."""
-    return PointBuffers(
-        positions=spheres.center,
-        radius=spheres.radius,
-        attributes={
-            "tf_color": spheres.color,
-            "tf_transmission": spheres.transmission,
-            **({} if spheres.velocity is None else {"velocity": spheres.velocity}),
-            **_mirrored(spheres),
-        },
+        attributes=attributes,
     )
 
 
 def facet_mesh(facets: Facets) -> MeshBuffers:
     """Facets as a mesh of triangles."""
-    return triangle_mesh(triangles_of(facets))
+    return shape_buffers(triangles_of(facets))
 
 
 def cover_for_light(facets: Facets, sun: Floats | None) -> Floats:
@@ -158,12 +135,6 @@ def facing(facets: Facets, camera: Camera) -> Floats:
         return np.abs(facets.normal @ camera.frame[:, 2])
     ray = facets.center - camera.eye
     return np.abs(np.einsum("ni,ni->n", facets.normal, ray)) / np.maximum(np.linalg.norm(ray, axis=1), 1e-300)
-
-
-def _mirrored(drawn: Triangles | Spheres) -> dict[str, Floats32]:
-    """Attributes of their gloss, where these differ from face to face."""
-    attributes = {"tf_roughness": drawn.roughness, "tf_dull": drawn.dull}
-    return {name: values for name, values in attributes.items() if values is not None}
 
 
 def _shaded(facets: Facets) -> tuple[Floats32 | None, ...]:

@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays import Arrays, Floats, Floats32, Integers, Integers32, Mask, chunks, spread
+from ..parallel import blocks
 
 #: Triangles that are measured at a time; bounds what that takes to some hundred megabytes.
 MEASURE_BATCH = 200_000
@@ -198,8 +199,7 @@ class Polygons(Arrays):
         instance, face = spread(np.diff(meshes.first_face)[meshes.surface])
         face += meshes.first_face[meshes.surface][instance]
         center = np.zeros((len(face), 3))
-        for start in range(0, len(face), MEASURE_BATCH):
-            some = slice(start, start + MEASURE_BATCH)
+        for some in blocks(len(face), MEASURE_BATCH):
             center[some] = meshes.to_world(meshes.centers[face[some], None], instance[some])[:, 0]
         reach = meshes.radii[face] * meshes.largest[instance]
         whole = np.full(len(face), -1, np.int32)

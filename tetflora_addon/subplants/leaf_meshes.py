@@ -2,20 +2,18 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Leaves as polygons: copies of the species' leaf models, written straight into the arrays of their mesh.
 
-See section 5 of the paper. What is small in the image may be a kite, see `leaves.levels`; what is large
-has finer levels, see `leaves.levels`.
-
-Meshes of copies of a leaf model, written straight into the arrays of the mesh.
+See section 5 of the paper. What is small in the image may be a kite, and what is large has finer levels, see
+`leaves.levels`.
 """
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import Floats, Floats32, Integers, Integers32, Keys, chunks, gathered, spread
+from ..arrays import Floats, Floats32, Integers, Keys, chunks, gathered, spread
 from ..buffers import MeshBuffers
 from ..compiled.flora import Flora
 from ..growth import foliage
@@ -36,24 +34,36 @@ class LeafCopies:
 
     Parameters
     ----------
-    model : LeafModel
+    of : LeafModel, LeafKites or LeafLevel
+        A model; kites that stand for one, of which keys choose a plane; or a finer level, of which they choose a
+        variant, and which is shaded smooth.
     number : int
         Of copies in the end, at most.
     transmission : float
         Fraction of the light scattered through the leaf, the same for all.
     moving : bool
         Whether they have velocities.
+    dull : float
+        Part of the gloss of leaves that these hide from each other.
     """
 
     def __init__(
-        self, model: LeafModel, number: int, transmission: float, moving: bool = False, dull: float = 0.0
+        self,
+        of: LeafModel | LeafKites | LeafLevel,
+        number: int,
+        transmission: float,
+        moving: bool = False,
+        dull: float = 0.0,
     ) -> None:
-        self.model, self.dull = model, dull
-        self.done = 0
-        self.transmission = transmission
-        self.positions = np.zeros((number, 3 * len(model.positions)), np.float32)
+        self.of, self.dull, self.done, self.transmission = of, dull, 0, transmission
+        shapes = of.shapes if isinstance(of, LeafLevel) else of.positions
+        self.model = of.model if isinstance(of, LeafLevel) else KITE if isinstance(of, LeafKites) else of
+        self._corners = shapes.reshape(-1, 3)
+        self.shapes = shapes.reshape(-1, *self.model.positions.shape).astype(np.float32).transpose(1, 2, 0)
+        self._variant = np.zeros(number, np.int8)  # which of the shapes each has
+        self.positions = np.zeros((number, 3 * len(self.model.positions)), np.float32)
         self.velocity = np.zeros_like(self.positions) if moving else None
-        self.color = np.zeros((number, model.polygons, 3), np.float32)
+        self.color = np.zeros((number, self.model.polygons, 3), np.float32)
 
     def add(
         self,
@@ -83,7 +93,7 @@ class LeafCopies:
         """
         new = slice(self.done, self.done + len(size))
         self.done = new.stop
-        shape = self._shapes(key, new)
+        shape = self.shapes if isinstance(self.of, LeafModel) else self._chosen(key, new)
         self.positions[new] = _placed(shape, position, frame, size)
         if motion is not None:
             self.velocity[new] = _placed(shape, *motion, size)
@@ -91,27 +101,35 @@ class LeafCopies:
 
     def spheres(self, position: Floats, frame: Floats32, size: Floats) -> tuple[Floats, Floats]:
         """Middles (n, 3) and radii (n,) of spheres that hold copies, placed as by `add`, whichever shape they have."""
-        corners = self._corners()
+        corners = self._corners
         middle = (corners.min(axis=0) + corners.max(axis=0)) / 2.0
         reach = float(np.linalg.norm(corners - middle, axis=1).max())
         middle = sum(frame[:, :, axis] * np.float32(middle[axis]) for axis in range(3))
         return position + size[:, None] * middle, reach * size
 
-    def _corners(self) -> Floats:
-        """Vertices (m, 3) of all shapes that copies may have."""
-        return self.model.positions
-
-    def _shapes(self, key: Keys, new: slice) -> Floats32:
-        """Vertices (v, 3, n or 1) of copies with keys (n,) before they are placed."""
-        return self.model.positions.astype(np.float32)[:, :, None]
+    def _chosen(self, key: Keys, new: slice) -> Floats32:
+        """Vertices (v, 3, n) of copies with keys (n,) before they are placed."""
+        if isinstance(self.of, LeafKites):
+            self._variant[new] = self.of.chosen(uniform(key, Draw.LEAF_PLANE))
+        else:
+            self._variant[new] = uniform(key, Draw.LEAF_VARIANT) * self.shapes.shape[2]
+        return self.shapes[:, :, self._variant[new]]
 
     def buffers(self) -> MeshBuffers:
         """The mesh, once all copies are placed."""
-        model, n = self.model, self.done
+        model, n, level = self.model, self.done, isinstance(self.of, LeafLevel)
+        if level:
+            self._color_level(self.of)
         edges, edge_of_corner = model.edges
         vertices, corners = len(model.positions), len(model.corner_verts)
         starts = _stepped(model.face_offsets[:-1], corners, n)
-        index = self._materials()
+        uv, index = model.uv, model.material_index
+        if isinstance(self.of, LeafKites):
+            uv, index = self.of.uv[self._variant[:n]], self.of.material_index
+            index = None if index is None else index[self._variant[:n]]
+        else:
+            uv = _stepped(uv.reshape(-1), 0, n)
+            index = None if index is None else _stepped(index, 0, n)
         materials = {} if index is None else {"material_index": ("FACE", index)}
         motion = {} if self.velocity is None else {"velocity": ("POINT", self.velocity[:n].reshape(-1, 3))}
         faces = n * model.polygons
@@ -123,85 +141,21 @@ class LeafCopies:
             corner_edges=_stepped(edge_of_corner, len(edges), n),
             face_offsets=np.append(starts, np.int32(n * corners)),
             attributes={
-                "UVMap": ("CORNER", self._texture()),
+                "UVMap": ("CORNER", uv.reshape(-1, 2)),
                 "tf_color": ("FACE", self.color[:n].reshape(-1, 3)),
                 "tf_transmission": ("FACE", np.full(faces, self.transmission, np.float32)),
                 **dull,
                 **materials,
                 **motion,
             },
-            smooth=model.closed and not model.textured,  # fruit and fleshy leaves are round
+            smooth=level or (model.closed and not model.textured),  # fruit and fleshy leaves are round
         )
 
-    def _texture(self) -> Floats32:
-        """Texture coordinates (corners, 2)."""
-        return _stepped(self.model.uv.reshape(-1), 0, self.done).reshape(-1, 2)
-
-    def _materials(self) -> Integers32 | None:
-        """Material (faces,) of each face, where there are several."""
-        model = self.model
-        return None if model.material_index is None else _stepped(model.material_index, 0, self.done)
-
-
-class KiteCopies(LeafCopies):
-    """Copies of a leaf model as one kite each, in planes that their keys choose.
-
-    Parameters
-    ----------
-    kites : LeafKites
-    number, transmission, moving
-        As of `LeafCopies`.
-    """
-
-    def __init__(
-        self, kites: LeafKites, number: int, transmission: float, moving: bool = False, dull: float = 0.0
-    ) -> None:
-        super().__init__(KITE, number, transmission, moving, dull)
-        self.kites = kites
-        self.plane = np.zeros(number, np.int8)
-
-    def _corners(self) -> Floats:
-        return self.kites.positions.reshape(-1, 3)
-
-    def _shapes(self, key: Keys, new: slice) -> Floats32:
-        self.plane[new] = self.kites.chosen(uniform(key, Draw.LEAF_PLANE))
-        return self.kites.positions.astype(np.float32).transpose(1, 2, 0)[:, :, self.plane[new]]
-
-    def _texture(self) -> Floats32:
-        return self.kites.uv[self.plane[: self.done]].reshape(-1, 2)
-
-    def _materials(self) -> Integers32 | None:
-        index = self.kites.material_index
-        return None if index is None else index[self.plane[: self.done]]
-
-
-class LevelCopies(LeafCopies):
-    """Copies of a finer level of a leaf, of which their keys choose a variant; shaded smooth.
-
-    Parameters
-    ----------
-    level : LeafLevel
-    number, transmission, moving
-        As of `LeafCopies`.
-    """
-
-    def __init__(self, level: LeafLevel, number: int, transmission: float, moving: bool = False) -> None:
-        super().__init__(level.model, number, transmission, moving)
-        self.level, self.shapes = level, level.shapes.transpose(1, 2, 0)
-
-    def _corners(self) -> Floats:
-        return self.level.shapes.reshape(-1, 3)
-
-    def _shapes(self, key: Keys, new: slice) -> Floats32:
-        variants = self.shapes.shape[2]
-        return self.shapes[:, :, (uniform(key, Draw.LEAF_VARIANT) * variants).astype(np.int64)]
-
-    def buffers(self) -> MeshBuffers:
-        """The mesh, once all copies are placed."""
-        self.color = np.asarray(self.level.colors(self.color[: self.done]), np.float32)
-        if self.level.solid:
+    def _color_level(self, level: LeafLevel) -> None:
+        """Give the faces of a level their own colors."""
+        self.color = np.asarray(level.colors(self.color[: self.done]), np.float32)
+        if level.solid:
             self.transmission = self._through()
-        return replace(super().buffers(), smooth=True)
 
     def _through(self) -> float:
         """Transmission of the faces of solid needles, which light passes twice; their colors are changed to it.
@@ -308,12 +262,9 @@ def leaf_meshes(
 def _copies(model: LeafModel, step: int, number: int, transmission: float, moving: bool) -> LeafCopies:
     """Room for a number of leaves of one step."""
     if step > 0:
-        return LevelCopies(leaf_levels(model, step)[step - 1], number, transmission, moving)
-    if step == _KITE and not model.textured:
-        return KiteCopies(leaf_kites(model), number, transmission, moving, hidden_gloss(model))
-    if step == _PLANES and not model.textured:
-        return LeafCopies(leaf_planes(model), number, transmission, moving, hidden_gloss(model))
-    return LeafCopies(model, number, transmission, moving, hidden_gloss(model))
+        return LeafCopies(leaf_levels(model, step)[step - 1], number, transmission, moving)
+    of = model if model.textured or step == 0 else leaf_kites(model) if step == _KITE else leaf_planes(model)
+    return LeafCopies(of, number, transmission, moving, hidden_gloss(model))
 
 
 def _bearers(flora: Flora, whole: WholeBranches) -> "Iterator[_LeafBearers]":

@@ -18,9 +18,17 @@ FACES = np.array([(1, 2, 3), (0, 3, 2), (0, 1, 3), (0, 2, 1)])
 
 
 def signed_volume(vertices: Floats) -> Floats:
-    """Volume ``(...)`` of tetrahedra ``(..., 4, 3)``, det(v1 − v0, v2 − v0, v3 − v0) / 6, cubic meters.
+    """Volume, positive where the tetrahedron is positively oriented.
 
-    Positive where the tetrahedron is positively oriented.
+    Parameters
+    ----------
+    vertices : (..., 4, 3) float64
+        Tetrahedra, meters.
+
+    Returns
+    -------
+    (...) float64
+        det(v1 − v0, v2 − v0, v3 − v0) / 6, cubic meters.
     """
     a, b, c = (vertices[..., i, :] - vertices[..., 0, :] for i in (1, 2, 3))
     return np.sum(np.cross(a, b) * c, axis=-1) / 6.0
@@ -62,10 +70,18 @@ def quality(vertices: Floats) -> Floats:
 
 
 def face_area_vectors(vertices: Floats) -> Floats:
-    """Outward normals times area ``(..., 4, 3)`` of the faces of positive tetrahedra ``(..., 4, 3)``, m².
+    """Outward normals times area of the four faces of positive tetrahedra.
 
-    Vector ``i`` belongs to the face opposite vertex ``i``. The four add up to zero, and point inwards where the
-    orientation is negative.
+    Parameters
+    ----------
+    vertices : (..., 4, 3) float64
+        Tetrahedra, meters.
+
+    Returns
+    -------
+    (..., 4, 3) float64
+        Vector ``i`` belongs to the face opposite vertex ``i``; square meters. The four add up to zero. They point
+        inwards where the orientation is negative.
     """
     a, b, c, d = (vertices[..., i, :] for i in range(4))
     ab, ac, ad = b - a, c - a, d - a
@@ -75,18 +91,36 @@ def face_area_vectors(vertices: Floats) -> Floats:
 
 
 def projected_area(vertices: Floats, direction: Floats) -> Floats:
-    """Area ``(...)`` of the silhouette in parallel projection, half of Σ |A_i · ω|, m².
+    """Area of the silhouette in parallel projection: half of Σ |A_i · ω|.
 
-    Of tetrahedra ``(..., 4, 3)`` in either orientation, along unit directions ``(3,)`` or ``(..., 3)``.
+    Parameters
+    ----------
+    vertices : (..., 4, 3) float64
+        Tetrahedra of either orientation, meters.
+    direction : (3,) or (..., 3) float64
+        Unit viewing directions.
+
+    Returns
+    -------
+    (...) float64
+        Square meters, measured across the direction.
     """
     areas = face_area_vectors(vertices)
     return np.sum(np.abs(np.sum(areas * np.asarray(direction)[..., None, :], axis=-1)), axis=-1) / 2.0
 
 
 def barycentric_gradients(vertices: Floats) -> Floats:
-    """Gradients ``(..., 4, 3)`` of the barycentric coordinates of tetrahedra ``(..., 4, 3)``, ∇λ_i = −A_i / (3V), 1/m.
+    """Gradients of the four barycentric coordinates.
 
-    In either orientation; zero for tetrahedra without volume.
+    Parameters
+    ----------
+    vertices : (..., 4, 3) float64
+        Tetrahedra of either orientation, meters.
+
+    Returns
+    -------
+    (..., 4, 3) float64
+        ∇λ_i = −A_i / (3V), 1/m; zero for tetrahedra without volume.
     """
     triple = 3.0 * signed_volume(vertices)[..., None, None]
     flat = triple == 0.0
@@ -94,9 +128,19 @@ def barycentric_gradients(vertices: Floats) -> Floats:
 
 
 def barycentric(vertices: Floats, points: Floats) -> Floats:
-    """Barycentric coordinates ``(..., 4)`` of points ``(..., 3)``, a tetrahedron ``(..., 4, 3)`` each, in meters.
+    """Barycentric coordinates of points, one tetrahedron each (leading axes broadcast).
 
-    λ with Σ λ = 1 and Σ λ_i v_i = point; leading axes broadcast.
+    Parameters
+    ----------
+    vertices : (..., 4, 3) float64
+        Tetrahedra, meters.
+    points : (..., 3) float64
+        Points, meters.
+
+    Returns
+    -------
+    (..., 4) float64
+        λ with Σ λ = 1 and Σ λ_i v_i = point.
     """
     gradients = barycentric_gradients(vertices)[..., 1:, :]
     rest = np.sum(gradients * (points - vertices[..., 0, :])[..., None, :], axis=-1)
@@ -104,9 +148,19 @@ def barycentric(vertices: Floats, points: Floats) -> Floats:
 
 
 def plane_through(points: Floats, negative: Floats) -> Floats:
-    """Planes ``(..., 4)``, as ``(nx, ny, nz, d)`` with unit normals, through points ``(..., 3, 3)``, meters.
+    """Planes through three points each, turned so that a fourth one is on the negative side.
 
-    The three points of each are not on one line; ``negative`` ``(..., 3)`` are points on the side 0 of each.
+    Parameters
+    ----------
+    points : (..., 3, 3) float64
+        Three points of each plane, meters; not on one line.
+    negative : (..., 3) float64
+        A point on side 0 of each plane.
+
+    Returns
+    -------
+    (..., 4) float64
+        ``(nx, ny, nz, d)`` with unit normal.
     """
     a, b, c = (points[..., i, :] for i in range(3))
     normal = np.cross(b - a, c - a)

@@ -28,7 +28,17 @@ TIE = 1e-9
 
 
 def longest_edge(vertices: Floats) -> Integers:
-    """Index (n,) into `geometry.EDGES` of the longest edge of tetrahedra (n, 4, 3), the first of those as long."""
+    """Index into `geometry.EDGES` of the longest edge; the first of those that are equally long.
+
+    Parameters
+    ----------
+    vertices : (n, 4, 3) float64
+        Tetrahedra, meters.
+
+    Returns
+    -------
+    (n,) intp
+    """
     squared = squared_edges(vertices)
     return np.argmax(squared >= np.max(squared, axis=1, keepdims=True) * (1.0 - TIE), axis=1)
 
@@ -423,9 +433,17 @@ class TetrahedralTree:
         return place
 
     def locate(self, points: ArrayLike) -> Integers32:
-        """Terminal (n,) that holds each point (n, 3), world space, meters; a point on a plane belongs to side 1.
+        """Terminal that holds each point; points outside the root go to the one on their side of all planes.
 
-        Points outside the root go to the one on their side of all planes.
+        Parameters
+        ----------
+        points : (n, 3) float64
+            Meters, world space.
+
+        Returns
+        -------
+        (n,) int32
+            Node numbers. A point on a plane belongs to side 1.
         """
         points = np.asarray(points, np.float64).reshape(-1, 3)
         found = np.zeros(len(points), np.int32)

@@ -15,13 +15,21 @@ from tetflora_addon.blender import compat
 from tetflora_addon.blender.materials import microsphere
 from tetflora_addon.blender.results import meshes
 from tetflora_addon.emission import shells
+from tetflora_addon.light.receivers import MediumCells
+from tetflora_addon.tetrahedra.geometry import signed_volume
 
 pytestmark = pytest.mark.usefixtures("clean_file")
 
 SIZE, WIDTH = 24, 2.4
 # A regular tetrahedron of edge 1.63 m, all of it in view.
-REGULAR = np.array([[1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]]) / np.sqrt(3.0)
+REGULAR = np.array([[1, 1, 1], [-1, 1, -1], [1, -1, -1], [-1, -1, 1]]) / np.sqrt(3.0)
 ISOTROPIC = np.array([1.0, 1.0, 1.0, 0.0, 0.0, 0.0])
+
+
+def upright(vertices):
+    """Cells (n, 4, 3) in positive orientation."""
+    vertices = np.asarray(vertices, np.float64)
+    return np.where(signed_volume(vertices)[:, None, None] < 0.0, vertices[:, [0, 2, 1, 3]], vertices)
 
 
 def place(
@@ -29,14 +37,15 @@ def place(
 ):
     """Link shells of the cells (n, 4, 3) with S (n, 6) to the scene."""
     count = len(vertices)
-    buffers = shells.shell_buffers(
-        vertices,
+    cells = MediumCells(
+        upright(vertices),
+        np.broadcast_to(extinction, (count, 6)),
         np.full((count, 3), color),
         np.full(count, transmission),
-        np.broadcast_to(extinction, (count, 6)),
         np.tile(normal, (count, 1)),
         np.full(count, plane),
     )
+    buffers = shells.shell_buffers(cells)
     material = microsphere.shell_material()
     group = next(n for n in material.node_tree.nodes if n.bl_idname == "ShaderNodeGroup")
     for name, value in {"Stochastic": stochastic, "s": 0.0, "Variation": 0.0, "Roundness": 0.0, **sockets}.items():
@@ -226,16 +235,15 @@ def test_a_camera_inside_sees_what_is_left_of_the_way(name, kind):
 def baked(path, light, extinction):
     """Baked picture of cells (n, 4, 3), far to near, whose radiance at the corners is `light` (n, 4)."""
     count = len(path)
-    buffers = shells.shell_buffers(
+    cells = MediumCells(
         path,
-        np.zeros((count, 3)),
-        np.zeros(count),
         ISOTROPIC * extinction[:, None] ** 2,
         np.zeros((count, 3)),
         np.zeros(count),
-        rank=np.arange(count)[::-1],
-        light=np.repeat(light[..., None], 3, axis=2),
+        np.zeros((count, 3)),
+        np.zeros(count),
     )
+    buffers = shells.shell_buffers(cells, np.arange(count)[::-1], np.repeat(light[..., None], 3, axis=2))
     material = microsphere.baked_shell_material()
     mesh = meshes.write_mesh("shells", buffers, [material])
     bpy.context.scene.collection.objects.link(bpy.data.objects.new("shells", mesh))
@@ -246,7 +254,9 @@ def baked(path, light, extinction):
 def test_baked_light_follows_the_integral(name, count):
     """∫ J e^{−κt} κ dt by many steps, cell by cell, J linear between the corners."""
     rng = np.random.default_rng(8)
-    cells = REGULAR @ np.linalg.qr(rng.normal(size=(count, 3, 3)))[0] + np.arange(count)[:, None, None] * [0, 0, 3.0]
+    turns = np.linalg.qr(rng.normal(size=(count, 3, 3)))[0]
+    turns *= np.linalg.det(turns)[:, None, None]  # no mirror images
+    cells = REGULAR @ turns + np.arange(count)[:, None, None] * [0, 0, 3.0]
     light, kappa = rng.uniform(0.0, 2.0, (count, 4)), rng.uniform(0.02, 1.5, count)
     at_centers(engine=engine(name))
     baked(cells, light, kappa)

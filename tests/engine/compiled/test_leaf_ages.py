@@ -17,7 +17,7 @@ from tetflora_addon.compiled.averages import own_leaf_integrals
 from tetflora_addon.compiled.clumping import fingerprint
 from tetflora_addon.compiled.orientation import leaf_moments
 from tetflora_addon.growth.foliage import YOUTH, leaf_lights, leaf_sizes, youth
-from tetflora_addon.proxies.microsurfaces import subplant_facets
+from tetflora_addon.proxies.microsurfaces import FacetRules, subplant_facets
 from tetflora_addon.refinement.contents import piece_totals, subplant_totals
 from tetflora_addon.subplants.pieces import Pieces, piece_leaf_colors
 
@@ -83,7 +83,7 @@ def test_pieces_add_up(seed: int, cut: float) -> None:
 def test_facets_have_the_color_of_leaves_of_all_ages() -> None:
     flora = aged()
     trunk, _ = support.grown(flora, support.plants(np.arange(20)))
-    facets = subplant_facets(flora, trunk, np.full(20, 0.05))
+    facets = subplant_facets(flora, trunk, FacetRules(np.full(20, 0.05)))
     leaves = facets.transmission > 0
     mean = np.average(facets.color[leaves], axis=0, weights=facets.side[leaves] ** 2)
     np.testing.assert_allclose(mean, flora.leaf_colors(trunk)[0], rtol=0.05)

@@ -18,7 +18,7 @@ from tetflora_addon.camera.camera import Camera
 from tetflora_addon.emission import drawing as subject
 from tetflora_addon.emission.budget import fit_to_budget
 from tetflora_addon.emission.coverage import MARGIN, Coverage, Shade
-from tetflora_addon.emission.emitters import as_triangles, facet_blocks
+from tetflora_addon.emission.emitters import FacetForm, facet_blocks
 from tetflora_addon.emission.frontier import Frontier
 from tetflora_addon.emission.plants import GrownPlants, Transition, expanded_blocks
 from tetflora_addon.growth.growth import trunks
@@ -407,7 +407,7 @@ def test_nothing_to_draw() -> None:
 def test_triangles_are_the_facets() -> None:
     flora, _, camera, result = scene()
     facets = support.drawn(flora, result, camera)[1]
-    scene_ = support.refined(flora, result, camera, form=as_triangles)
+    scene_ = support.refined(flora, result, camera, form=FacetForm(camera, np.pi, None, ()))
     list(scene_.mesh_blocks())
     blocks = list(facet_blocks(scene_))
     assert sum(b.polygons for b in blocks) == len(facets)

@@ -14,7 +14,7 @@ from tests.engine.emission.test_emission import scene
 from tetflora_addon.arrays import unit
 from tetflora_addon.buffers import MeshBuffers, PointBuffers
 from tetflora_addon.camera.camera import Camera
-from tetflora_addon.emission.emitters import AsSpheres, as_triangles, facet_blocks
+from tetflora_addon.emission.emitters import FacetForm, facet_blocks
 from tetflora_addon.proxies.microsurfaces import Facets
 from tetflora_addon.proxies.primitives import (
     LEAST_COVER,
@@ -22,7 +22,7 @@ from tetflora_addon.proxies.primitives import (
     facet_mesh,
     facing,
     joined,
-    sphere_points,
+    shape_buffers,
     spheres_of,
 )
 
@@ -50,7 +50,7 @@ def discs(radius: np.ndarray) -> np.ndarray:
 def test_what_a_facet_covers_for_the_camera_its_sphere_covers(kind: str) -> None:
     """By the corners of the facets themselves, projected; but for those that are seen from their edge."""
     facets, view = squares(), camera(kind)
-    made = sphere_points(spheres_of(facets, view))
+    made = shape_buffers(spheres_of(facets, view))
     vectors = support.face_vectors(facet_mesh(facets))
     sight = np.array([0.0, 1.0, 0.0]) if kind == "ORTHO" else unit(facets.center - EYE)
     shown = np.abs((vectors * sight).sum(axis=1))
@@ -72,7 +72,7 @@ def test_what_nobody_sees_casts_the_same_shadow_on_average_over_light_from_the_s
     facets = squares(3000)
     vectors = support.face_vectors(facet_mesh(facets))
     for sun in (None, np.array([0.6, 0.0, -0.8])):  # below the horizon
-        made = sphere_points(spheres_of(facets, None, sun=sun))
+        made = shape_buffers(spheres_of(facets, None, sun=sun))
         assert discs(made.radius) == pytest.approx(np.abs(vectors @ skylight().T).mean(axis=1), rel=0.03)
 
 
@@ -84,7 +84,7 @@ def test_what_nobody_sees_casts_the_same_shadow_in_the_sun(height: float) -> Non
         facets, across=np.tile(np.eye(3)[0], (len(facets), 1)), along=np.tile(np.eye(3)[1], (len(facets), 1))
     )
     sun = np.array([np.cos(up), 0.0, np.sin(up)])
-    covered = discs(sphere_points(spheres_of(facets, None, sun=sun)).radius) / facets.side**2
+    covered = discs(shape_buffers(spheres_of(facets, None, sun=sun)).radius) / facets.side**2
     direct = sun[2] / (sun[2] + SKYLIGHT)
     assert covered == pytest.approx(direct * sun[2] + (1.0 - direct) * 2.0 / 3.0, rel=1e-5)
     assert height < 30.0 or covered == pytest.approx(sun[2], rel=0.06)
@@ -92,7 +92,7 @@ def test_what_nobody_sees_casts_the_same_shadow_in_the_sun(height: float) -> Non
 
 def test_places_and_looks_are_those_of_the_facets() -> None:
     some, others = squares(50), squares(30)
-    made = sphere_points(joined([spheres_of(some, camera()), spheres_of(others, None)]))
+    made = shape_buffers(joined([spheres_of(some, camera()), spheres_of(others, None)]))
     assert made.polygons == 80
     for values, name in ((made.positions, "center"), *((v, k.removeprefix("tf_")) for k, v in made.attributes.items())):
         expected = np.concatenate([getattr(part, name) for part in (some, others)])
@@ -104,9 +104,9 @@ def test_a_refinement_has_a_sphere_for_each_facet() -> None:
     flora, _, view, result = scene()
     made = {}
     for name, form in (
-        ("all", AsSpheres(view, np.pi, None, True)),
-        ("hidden", AsSpheres(view, np.pi, None, False)),
-        ("none", as_triangles),
+        ("all", FacetForm(view, np.pi, None, (True, False))),
+        ("hidden", FacetForm(view, np.pi, None, (False,))),
+        ("none", FacetForm(view, np.pi, None, ())),
     ):
         refined = support.refined(flora, result, view, form=form)
         list(refined.mesh_blocks())

@@ -3,27 +3,33 @@
 """Shells keep what the shader relies on: closed, outward faces and exact thickness, wherever the cells are."""
 
 import numpy as np
-import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tetflora_addon.emission.shells import cell_gradients, directional_mean, shell_buffers
+from tetflora_addon.emission.shells import shell_buffers
+from tetflora_addon.light.receivers import MediumCells
+from tetflora_addon.tetrahedra.geometry import signed_volume
 
 
 def cells(seed: int, count: int = 20, origin: float = 0.0) -> np.ndarray:
-    return np.random.default_rng(seed).normal(size=(count, 4, 3)) + origin
+    vertices = np.random.default_rng(seed).normal(size=(count, 4, 3)) + origin
+    return np.where(signed_volume(vertices)[:, None, None] < 0.0, vertices[:, [0, 2, 1, 3]], vertices)
 
 
-def build(vertices: np.ndarray, **changes):
+def build(vertices: np.ndarray, color: np.ndarray | None = None, **options):
+    return shell_buffers(medium(vertices, np.array([4.0, 1.0, 9.0, 0.0, 0.0, 0.0]), color), **options)
+
+
+def medium(vertices: np.ndarray, matrices: np.ndarray, color: np.ndarray | None = None) -> MediumCells:
     count = len(vertices)
-    values = {
-        "color": np.full((count, 3), 0.2),
-        "transmission": np.full(count, 0.3),
-        "S": np.tile([4.0, 1.0, 9.0, 0.0, 0.0, 0.0], (count, 1)),
-        "normal": np.tile([0.0, 0.0, 2.0], (count, 1)),
-        "plane": np.full(count, 0.5),
-    }
-    return shell_buffers(vertices, **{**values, **changes})
+    return MediumCells(
+        vertices,
+        np.broadcast_to(matrices, (count, 6)),
+        np.full((count, 3), 0.2) if color is None else color,
+        np.full(count, 0.3),
+        np.tile([0.0, 0.0, 1.0], (count, 1)),
+        np.full(count, 0.5),
+    )
 
 
 @settings(deadline=None, max_examples=25)
@@ -59,15 +65,12 @@ def test_exit_distance_from_the_attributes_is_the_true_one(seed, origin):
     vertices = cells(seed, 8, origin)
     buffers = build(vertices)
     gradients = np.stack([buffers.attributes[f"tf_g{k}"][1][::4] for k in (1, 2, 3)], axis=1).astype(np.float64)
-    local = buffers.positions.astype(np.float64).reshape(-1, 4, 3)
     weights = rng.dirichlet([1.0, 1.0, 1.0], size=8)
     inside = rng.dirichlet([2.0, 2.0, 2.0, 2.0], size=8)
     # Enter through the face opposite vertex 0, toward an inner point.
     entry_weights = np.concatenate([np.zeros((8, 1)), weights], axis=1)
-    # Undo the rounding of positions: thickness must not depend on where the cell is.
-    exact = np.where(
-        (np.abs(local - vertices).max(axis=(1, 2)) < 1e-2)[:, None, None], vertices, vertices[:, [0, 2, 1, 3]]
-    )
+    # Without the rounding of positions: thickness must not depend on where the cell is.
+    exact = vertices
     entry = np.einsum("nk,nki->ni", entry_weights, exact)
     direction = np.einsum("nk,nki->ni", inside, exact) - entry
     direction /= np.linalg.norm(direction, axis=1)[:, None]
@@ -87,10 +90,11 @@ def test_exit_distance_from_the_attributes_is_the_true_one(seed, origin):
 
 def test_gradients_are_those_of_barycentric_coordinates():
     vertices = cells(3, 50)
-    gradients, flat = cell_gradients(vertices)
+    attributes = build(vertices).attributes
+    gradients = np.stack([attributes[f"tf_g{k}"][1][::4] for k in (1, 2, 3)], axis=1).astype(np.float64)
     spans = vertices[:, 1:] - vertices[:, :1]
-    np.testing.assert_allclose(np.einsum("nki,nji->nkj", gradients, spans), np.tile(np.eye(3), (50, 1, 1)), atol=1e-9)
-    assert not flat.any()
+    expected = np.tile(np.eye(3), (50, 1, 1))
+    np.testing.assert_allclose(np.einsum("nki,nji->nkj", gradients, spans), expected, atol=1e-4)
 
 
 def test_flat_cells_hold_nothing():
@@ -104,21 +108,17 @@ def test_flat_cells_hold_nothing():
 
 
 def test_directional_mean():
-    np.testing.assert_allclose(directional_mean([[4.0, 4.0, 4.0, 0.0, 0.0, 0.0]]), 2.0, rtol=1e-12)
+    even = medium(cells(2, 1), np.array([4.0, 4.0, 4.0, 0.0, 0.0, 0.0]))
+    np.testing.assert_allclose(even.mean_extinction, 2.0, rtol=1e-12)
     # Flakes of one orientation: the mean of |cos| over the sphere is one half, whatever the orientation.
     axes = np.random.default_rng(0).normal(size=(20, 3))
     x, y, z = (axes / np.linalg.norm(axes, axis=1)[:, None]).T
-    np.testing.assert_allclose(
-        directional_mean(np.stack([x * x, y * y, z * z, x * y, x * z, y * z], axis=1)), 0.5, rtol=0.02
-    )
+    alike = medium(cells(2), np.stack([x * x, y * y, z * z, x * y, x * z, y * z], axis=1))
+    np.testing.assert_allclose(alike.mean_extinction, 0.5, rtol=0.02)
 
 
-def test_no_cells_and_wrong_shapes():
+def test_no_cells():
     assert build(np.zeros((0, 4, 3))).polygons == 0
-    with pytest.raises(ValueError, match="normal must have shape"):
-        build(cells(1), normal=np.zeros((3, 3)))
-    with pytest.raises(ValueError, match="vertices must have shape"):
-        shell_buffers(np.zeros((5, 3)), *[np.zeros(5)] * 5)
 
 
 def test_rank_writes_cells_back_to_front():
@@ -139,7 +139,7 @@ def test_rank_writes_cells_back_to_front():
 
 
 def test_light_stays_with_its_corner():
-    """Cells of either orientation: the radiance that is written is that of the position beside it."""
+    """The radiance that is written is that of the position beside it."""
     vertices = cells(9, 40)
     light = vertices @ np.array([[1.0, 0.0, 2.0], [0.5, 1.0, 0.0], [0.0, 3.0, 1.0]])
     buffers = build(vertices, light=light)
@@ -148,8 +148,6 @@ def test_light_stays_with_its_corner():
     expected = places @ np.array([[1.0, 0.0, 2.0], [0.5, 1.0, 0.0], [0.0, 3.0, 1.0]])
     np.testing.assert_allclose(written, expected, atol=1e-5)
     assert not any(name.startswith("tf_light") for name in build(vertices).attributes)
-    with pytest.raises(ValueError, match="light must have shape"):
-        build(vertices, light=light[:, :3])
 
 
 def test_the_noise_of_a_cell_is_even_and_its_own():

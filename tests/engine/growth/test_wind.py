@@ -25,8 +25,8 @@ from tetflora_addon.growth.growth import WholeBranches, leaf_counts
 from tetflora_addon.growth.rows import ROW_DTYPE
 from tetflora_addon.growth.wind import Wind, gusts, leaned, sway, widest_sway
 from tetflora_addon.proxies.facet_weights import facet_weights
-from tetflora_addon.proxies.microsurfaces import Facets, piece_facets, subplant_facets
-from tetflora_addon.proxies.primitives import facet_mesh, joined, sphere_points, spheres_of
+from tetflora_addon.proxies.microsurfaces import FacetRules, Facets, piece_facets, subplant_facets
+from tetflora_addon.proxies.primitives import facet_mesh, joined, shape_buffers, spheres_of
 from tetflora_addon.subplants.pieces import expand, open_subplants
 
 _FLOAT32 = 1e-6
@@ -297,7 +297,8 @@ def test_facets_move_with_what_bears_them(kind: str) -> None:
         twigs, _, more, _ = open_subplants(one, limbs)
         side = [np.full(len(some), 0.05) for some in (limbs, twigs, pieces, more)]
         make = (subplant_facets, subplant_facets, piece_facets, piece_facets)
-        return [f(one, some, size) for f, some, size in zip(make, (limbs, twigs, pieces, more), side, strict=True)]
+        rules = map(FacetRules, side)
+        return [f(one, some, how) for f, some, how in zip(make, (limbs, twigs, pieces, more), rules, strict=True)]
 
     for now, low, high in zip(facets(5.0, True), facets(5.0 - step), facets(5.0 + step), strict=True):
         assert low.velocity is None
@@ -309,7 +310,7 @@ def test_facets_move_with_what_bears_them(kind: str) -> None:
         assert np.linalg.norm(now.velocity, axis=1).max() > 0.01
         mesh = facet_mesh(now)
         np.testing.assert_array_equal(mesh.attributes["velocity"][1][::3], now.velocity.astype(np.float32))
-        points = sphere_points(spheres_of(now, None))
+        points = shape_buffers(spheres_of(now, None))
         np.testing.assert_array_equal(points.attributes["velocity"], now.velocity.astype(np.float32))
         both = joined([low, now])
         np.testing.assert_array_equal(both.velocity, np.concatenate([0 * now.velocity[: len(low)], now.velocity]))

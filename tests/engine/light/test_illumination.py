@@ -4,6 +4,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -14,7 +16,7 @@ from hypothesis import strategies as st
 from tests.engine import support
 from tetflora_addon.emission.shells import set_apart
 from tetflora_addon.light import buffers
-from tetflora_addon.light.illumination import Illumination, shadow_steps
+from tetflora_addon.light.illumination import Illumination, Sources, Surfaces, shadow_steps
 from tetflora_addon.light.receivers import MediumCells, SurfaceElements
 from tetflora_addon.light.scattering import (
     DIRECTIONS,
@@ -37,9 +39,13 @@ SUN = Light("SUN", np.zeros(3), DOWN, color=np.array([3.0, 2.0, 1.0]))
 _KUHN = [(1, 3, 7), (1, 5, 7), (2, 3, 7), (2, 6, 7), (4, 5, 7), (4, 6, 7)]
 
 
-def shadow_pass(*arguments, **options) -> Illumination:
-    """All steps of the pass at once."""
-    steps = shadow_steps(*arguments, **options)
+def shadow_pass(
+    cells: MediumCells, lights: Sequence[Light], world: World, occluders: np.ndarray | None = None, **options
+) -> Illumination:
+    """All steps of the pass at once; ``ground`` is the color of the occluders."""
+    occluders = np.zeros((0, 3, 3)) if occluders is None else occluders
+    sources = Sources(lights, world, occluders, np.array(options.pop("ground", (0.0, 0.0, 0.0))))
+    steps = shadow_steps(cells, sources, **options)
     while True:
         try:
             next(steps)
@@ -227,12 +233,11 @@ def test_white_facets_under_an_even_sky_are_white(transmission: float, seed: int
     found = _empty()
     points, cells = inside(seed, 8, found.clouds)
     camera = support.camera((20, 3, 1), (0, 0, -2))
-    sides = found.facet_radiance(points, normal, np.ones((8, 3)), np.full(8, transmission), cells, camera)
+    surfaces = Surfaces(points, normal, np.ones((8, 3)), np.full(8, transmission), cells)
+    sides = found.facet_radiance(surfaces, camera)
     # White stays white in each color where nothing tints it on its way through.
     assert np.array(sides)[..., :2] == pytest.approx(1.0, abs=0.01)
-    seen = found.cloud_radiance(
-        points, np.ones((8, 3)), np.full(8, transmission), cells, camera, normal, np.full(8, 0.4)
-    )
+    seen = found.cloud_radiance(surfaces, camera, np.full(8, 0.4))
     assert seen[:, :2] == pytest.approx(1.0, abs=0.01)
 
 
@@ -240,10 +245,10 @@ def test_dull_facets_mirror_less() -> None:
     """Black ones, whose light is gloss alone, send back what is left of it."""
     found = _empty()
     points, cells = inside(3, 8, found.clouds)
-    surface = points, np.tile([0.0, 0.0, 1.0], (8, 1)), np.zeros((8, 3)), np.full(8, 0.5), cells
-    surface = *surface, support.camera((20, 3, 1), (0, 0, -2))
-    bright = found.facet_radiance(*surface)[0]
-    dull = found.facet_radiance(*surface, dull=np.full(8, 0.75))[0]
+    surfaces = Surfaces(points, np.tile([0.0, 0.0, 1.0], (8, 1)), np.zeros((8, 3)), np.full(8, 0.5), cells)
+    camera = support.camera((20, 3, 1), (0, 0, -2))
+    bright = found.facet_radiance(surfaces, camera)[0]
+    dull = found.facet_radiance(replace(surfaces, dull=np.full(8, 0.75)), camera)[0]
     assert bright == pytest.approx(GLOSS, rel=0.01)
     assert dull == pytest.approx(0.25 * bright)
 
@@ -400,7 +405,8 @@ def test_a_view_of_what_is_near_gives_the_light_of_the_whole():
 def test_shells_stand_apart_and_are_as_dark_as_before():
     cloud = box(2.0)
     for offset in (0.0, 5000.0):
-        vertices, matrices = set_apart(cloud.vertices + offset, cloud.matrices)
+        apart = set_apart(replace(cloud, vertices=cloud.vertices + offset))
+        vertices, matrices = apart.vertices, apart.matrices
         stored = vertices.astype(np.float32).reshape(-1, 3)
         assert len(np.unique(stored, axis=0)) == len(stored)
         size = np.linalg.norm(vertices[:, 1] - vertices[:, 0], axis=1)

@@ -18,7 +18,7 @@ from tetflora_addon.growth.growth import trunks
 from tetflora_addon.growth.seasons import Season
 from tetflora_addon.jobs import run_to_end
 from tetflora_addon.proxies import facet_weights as subject
-from tetflora_addon.proxies.microsurfaces import CIRCUMRADIUS, piece_facets, subplant_facets
+from tetflora_addon.proxies.microsurfaces import CIRCUMRADIUS, FacetRules, piece_facets, subplant_facets
 from tetflora_addon.proxies.primitives import facet_mesh
 from tetflora_addon.refinement.contents import piece_totals, subplant_totals
 from tetflora_addon.refinement.rasterize import occluder_depth
@@ -58,12 +58,12 @@ def as_facets(flora: Flora, seeds, opened: int, side: float, weights: subject.Fa
         whole = (totals.leaf_area + totals.wood_area / 2) / np.maximum(pieces.t1 - pieces.t0, 1e-12)
         share = subject.leaf_shares(flora, pieces.branches)
         weight = None if weights is None else weights.of_pieces(pieces.branches.row, whole / side**2, share)
-        out.append(piece_facets(flora, pieces, np.full(len(pieces), side), weight=weight))
+        out.append(piece_facets(flora, pieces, FacetRules(np.full(len(pieces), side), weight=weight)))
     totals = subplant_totals(flora, some)
     area = totals.leaf_area + totals.wood_area / 2
     share = subject.leaf_shares(flora, some)
     weight = None if weights is None else weights.of_subplants(some.row, area / side**2, share)
-    out.append(subplant_facets(flora, some, np.full(len(some), side), weight=weight))
+    out.append(subplant_facets(flora, some, FacetRules(np.full(len(some), side), weight=weight)))
     return [triangles(facet_mesh(f)) for f in out if len(f)]
 
 
@@ -145,9 +145,8 @@ def test_between_known_numbers_weights_follow_the_logarithm(level: float, count:
 
 def test_the_least_weight_with_which_a_triangle_reaches_a_ray() -> None:
     """Seen face on: at its middle none is needed, at the middle of a side and at its corners all."""
-    facets = subplant_facets(
-        support.small_flora(), trunks(support.small_flora().rows, support.plants(1)), np.array([1.0])
-    )
+    flora = support.small_flora()
+    facets = subplant_facets(flora, trunks(flora.rows, support.plants(1)), FacetRules(np.array([1.0])))
     one = replace(
         facets,
         center=np.zeros((1, 3)),

@@ -11,7 +11,7 @@ from tetflora_addon.compiled.flora import compile_species
 from tetflora_addon.compiled.orientation import leaf_moments
 from tetflora_addon.growth.growth import trunks
 from tetflora_addon.growth.seeds import Seeds
-from tetflora_addon.proxies.microsurfaces import leaf_planes, subplant_facets
+from tetflora_addon.proxies.microsurfaces import FacetRules, leaf_planes, subplant_facets
 from tetflora_addon.species.catalog import load_species
 
 SPECIES = ("beech", "oak", "palm", "willow", "spruce")
@@ -39,7 +39,7 @@ def test_facets_are_turned_as_the_leaves_of_the_compiled_plant(identifier: str) 
         (identifier,), np.zeros(n, np.int32), np.arange(n), np.zeros((n, 3)), np.tile(np.eye(3), (n, 1, 1)), np.ones(n)
     )
     plants = trunks(flora.rows, seeds)
-    facets = subplant_facets(flora, plants, np.full(n, 0.2), np.full(n, 1e6))
+    facets = subplant_facets(flora, plants, FacetRules(np.full(n, 0.2), np.full(n, 1e6)))
     area, normal = facets.side**2, facets.normal
     found = np.einsum("n,ni,nj->ij", area, normal, normal) / area.sum()
     expected = leaf_moments(flora.orientation, plants).mean(axis=0)

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from tetflora_addon.growth.foliage import face_light
 from tetflora_addon.leaves.levels import leaf_kites, leaf_levels
 from tetflora_addon.leaves.models import LEAF_MODELS
-from tetflora_addon.subplants.leaf_meshes import KiteCopies, LeafCopies, LevelCopies
+from tetflora_addon.subplants.leaf_meshes import LeafCopies
 
 
 def frames(number: int, seed: int = 0) -> np.ndarray:
@@ -60,7 +60,7 @@ def test_kites_lie_where_their_keys_say() -> None:
     key, color = rng.integers(0, 2**63, number).astype(np.uint64), rng.random((number, 3))
     meshes = []
     for parts in ([number], [1500, 2500]):
-        copies = KiteCopies(kites, number, 0.25)
+        copies = LeafCopies(kites, number, 0.25)
         for part in np.split(np.arange(number), np.cumsum(parts)[:-1]):
             copies.add(key[part], position[part], frame[part].astype(np.float32), size[part], color[part])
         meshes.append(copies.buffers())
@@ -111,7 +111,7 @@ def test_solid_needles_send_on_as_much_light_as_sheets(color: float, transmissio
     """Light that enters a prism meets faces from within until it comes out."""
     level = next(level for level in leaf_levels(LEAF_MODELS["needles"], 4) if level.solid)
     plain = replace(level, again=np.zeros_like(level.again))
-    copies = LevelCopies(plain, 1, transmission)
+    copies = LeafCopies(plain, 1, transmission)
     copies.color[:], copies.done = color, 1
     made = copies.buffers().attributes
     needles = level.again > 0.0
