@@ -87,10 +87,12 @@ class Camera:
 
     def smaller(self, most: int) -> Self:
         """The same camera with an image of so many pixels at most on its longer side."""
-        size = min(most / max(self.width, self.height), 1.0)
-        width, height = max(round(size * self.width), 1), max(round(size * self.height), 1)
-        shutter = tuple(other.smaller(most) for other in self.shutter)
-        return replace(self, width=width, height=height, shutter=shutter)
+        return self.resized(min(most / max(self.width, self.height), 1.0))
+
+    def resized(self, times: float) -> Self:
+        """The same camera with so many times as many pixels on each side, at least one."""
+        width, height = max(round(times * self.width), 1), max(round(times * self.height), 1)
+        return replace(self, width=width, height=height, shutter=tuple(one.resized(times) for one in self.shutter))
 
     @property
     def eye(self) -> Floats:

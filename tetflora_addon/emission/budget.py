@@ -5,7 +5,7 @@ what refining and expanding will take: seconds, polygons and bytes.
 
 How many polygons and facets an image has follows from the pixels that plants cover: parts are drawn until these are
 full. Where facets are larger, there are fewer, as their area is. Where there are few, they may be finer than they have
-to be. Shells have one size; there, real leaves go to the tetrahedra that gain most by them for each polygon.
+to be: a small image is drawn as a larger one, since what hides facets has to be known as finely as they are. Shells have one size; there, real leaves go to the tetrahedra that gain most by them for each polygon.
 
 Estimates look at a few thousand leaves and branches, which stand for all there are (`compiled.sizes.CrownParts`), more
 of them on near plants. Each has a place in the image and a size there, from which follow its polygons, as they do when
@@ -54,7 +54,7 @@ BYTES_PER_TRIANGLE = 380
 A_PIXEL = 12.0
 #: Polygons and facets that are never too many with the facets of *Final*, see `relative_side`; and how many times finer
 #: facets are at most.
-PLENTY, FINEST = 2_400_000.0, 3.0
+PLENTY, FINEST = 2_400_000.0, 5.0
 #: What an expected number may be off by.
 RESERVE = 0.15
 #: Where a limit makes facets larger than asked for, there are fewer by this power of their side: each reaches more
@@ -72,6 +72,7 @@ class Detail:
     """How finely a refined scene is drawn."""
 
     refinement: Refinement  # decisions that fit into the budget
+    camera: Camera  # of an image whose pixels are no larger than facets; all else is in these pixels
     facet: float  # side of facets, pixels
     leaf_limit: float  # width in pixels up to which leaves are facets
     coarser: float = 1.0  # sides over those that are asked for
@@ -106,7 +107,7 @@ def fit_to_budget(
     """
     memory = settings.max_memory * 1e9 / BYTES_PER_POLYGON if settings.max_memory else np.inf
     most = (1.0 - RESERVE) * min(memory, settings.max_polygons or np.inf)
-    detail = Detail(result, settings.facet, settings.leaf_limit)
+    detail = Detail(result, camera, settings.facet, settings.leaf_limit)
     if faces is not None:
         if not np.isfinite(most):
             return detail
@@ -117,12 +118,14 @@ def fit_to_budget(
     coarser = relative_side(number, settings.facet)
     left = max(most - polygons, 0.01 * most) if np.isfinite(most) else most
     coarser = max(coarser, (number / left) ** (1.0 / _FEWER))
+    pixels = max(1.0 / (coarser * settings.facet), 1.0)
     return replace(
         detail,
-        facet=coarser * settings.facet,
-        leaf_limit=coarser * settings.leaf_limit,
+        camera=camera.resized(pixels),
+        facet=pixels * coarser * settings.facet,
+        leaf_limit=pixels * coarser * settings.leaf_limit,
         coarser=coarser,
-        tolerance=TOLERANCE * max(coarser, 1.0) ** 2,
+        tolerance=pixels * TOLERANCE * max(coarser, 1.0) ** 2,
         most=left,
     )
 

@@ -51,7 +51,8 @@ class EmissionInput:
         if self.drawing is None:
             return None
         number, area = map(sum, zip((0, 0.0), *self._seen, strict=True))
-        return self.drawing.facet * float(np.sqrt(area / number if number else 1.0))
+        own = self.drawing.camera.pixel_size / self.camera.pixel_size
+        return own * self.drawing.facet * float(np.sqrt(area / number if number else 1.0))
 
     def mesh_blocks(self) -> Iterator[Block]:
         """Meshes of plants. Facets are made with them, and wait until `facet_parts` is asked for them.

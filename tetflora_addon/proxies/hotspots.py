@@ -116,6 +116,9 @@ class LightRatios(Arrays):
         average over all ways to face that is as much light as without.
         """
         power = _EVENED * self.part[owner] * (1.0 - 1.0 / np.maximum(leaves, 1.0))
+        # What sends on nearly all of its light cannot make up for what it does not get.
+        brightest = np.clip(color.max(axis=1, initial=0.0), 1e-3, 1.0)
+        power = np.minimum(power, np.log(brightest) / np.log(_AMBIENT / (_AMBIENT + 0.5)))
         lit = _AMBIENT + np.abs(np.einsum("ni,ni->n", normal, self.toward[owner]))
         # The cosine of normals that face anywhere is as often small as large.
         left = 2.0 - power

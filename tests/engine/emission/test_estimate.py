@@ -131,9 +131,10 @@ def test_as_many_are_made(name, monkeypatch):
     flora, seeds, camera, stand = _seeds(name)
     result = run_to_end(refine(flora, seeds, camera, SETTINGS))
     detail = budget.fit_to_budget(result, camera, SETTINGS)
-    how = Transition(flora, camera, detail.leaf_limit, detail.tolerance), detail.facet, facet_weights(flora)
+    view = detail.camera
+    how = Transition(flora, view, detail.leaf_limit, detail.tolerance), detail.facet, facet_weights(flora)
     made = 0
-    for one in drawn_blocks(drawing(flora, detail.refinement, camera, *how, detail.coarser)):
+    for one in drawn_blocks(drawing(flora, detail.refinement, view, *how, detail.coarser)):
         made += sum(len(facets) for facets, _ in one) if isinstance(one, Parts) else one.buffers.polygons
     assert 1 / 1.5 < _estimate(stand, camera).primitives / made < 1.5
 

@@ -154,7 +154,7 @@ def test_limits_hold_up_close() -> None:
     def number(settings: RefinementSettings) -> int:
         detail = fit_to_budget(result, camera, settings)
         given = support.refined(
-            flora, result, camera, detail.facet, detail.leaf_limit, weighted=False, most=detail.most
+            flora, result, detail.camera, detail.facet, detail.leaf_limit, weighted=False, most=detail.most
         )
         blocks = list(given.mesh_blocks())
         return sum(b.buffers.polygons for b in blocks) + sum(

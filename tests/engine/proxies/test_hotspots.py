@@ -108,6 +108,18 @@ def test_facets_are_evened_and_send_as_much_light(leaves: float, part: float) ->
     assert (np.diff(together) > 0.0).all()  # what faces the lamp stays the brightest
 
 
+@given(st.floats(0.3, 1.0), st.floats(1.0, 100.0))
+def test_bright_facets_send_as_much_light(bright: float, leaves: float) -> None:
+    """None can be brighter than white, so that the brightest leaves are evened less; the mean stays."""
+    cosine = (np.arange(4000) + 0.5) / 4000
+    normal = np.stack([np.sqrt(1.0 - cosine**2), 0.0 * cosine, cosine], axis=1)
+    lit = LightRatios(np.ones(1), np.array([[0.0, 0.0, 1.0]]), np.ones(1))
+    color = np.tile([bright, 0.2, 0.1], (len(cosine), 1))
+    found = lit.colors(color, np.zeros(len(cosine), np.int64), normal, np.full(len(cosine), leaves))
+    light = (0.4 + cosine)[:, None]
+    assert (light * found).mean(axis=0) == pytest.approx((light * color).mean(axis=0), rel=2e-3)
+
+
 def test_leaves_and_facets_without_a_lamp_are_not_evened() -> None:
     normal, number = np.eye(3), np.array([1.0, 50.0, 50.0])
     none = LightRatios(np.ones(2), np.array([[0.0, 0.0, 1.0], [0.0, 0.0, 0.0]]), np.array([1.0, 0.0]))

@@ -513,14 +513,14 @@ def _refined(run: _Run, disc: float) -> Job[EmissionInput]:
     if bound is not None:
         looks = np.array([given.looks.get(owner, "") for owner in bound.owners])[bound.owner]
         how = bound.originals, detail.asset_limit, looks, detail.asset_larger
-        clusters = PlacedClusters(refinement.assets.placed, camera, *how)
+        clusters = PlacedClusters(refinement.assets.placed, detail.camera, *how)
     # Light is baked for facets, whatever is made of them then.
     becomes = None if run.baking is not None else form.form(camera, disc, sun_of(refinement.lights))
     with_all = drawing(
         flora,
         refinement,
-        camera,
-        Transition(flora, camera, detail.leaf_limit, detail.tolerance),
+        detail.camera,
+        Transition(flora, detail.camera, detail.leaf_limit, detail.tolerance),
         detail.facet,
         facet_weights(flora),
         detail.coarser,
