@@ -116,16 +116,32 @@ def _looks(flora: Flora, trunk: Branches) -> tuple[Floats, Floats, Floats]:
 
 
 def _crowns(
-    feet: Floats,  # (n, 3): where plants stand, meters
-    frame: Floats,  # (n, 3, 3): the axes of their trunks
-    heights: Floats,  # (n, 2): of the lowest and the highest leaves, meters
-    widths: Floats,  # (n, 2): radii of the two rings, meters
-    foot: Floats,  # (n,): radius of the trunk, meters
-    leaves: Floats,  # (n, 3): linear RGB
-    wood: Floats,  # (n, 3)
-    reach: Floats | float = 1.0,  # (n, `SIDES`): factors on the radii to all sides
+    feet: Floats,
+    frame: Floats,
+    heights: Floats,
+    widths: Floats,
+    foot: Floats,
+    leaves: Floats,
+    wood: Floats,
+    reach: Floats | float = 1.0,
 ) -> tuple[Floats32, Floats32]:
-    """Corners (v, 3) of crowns and trunks, and their colors as a screen shows them."""
+    """Corners (v, 3) of crowns and trunks, and their colors as a screen shows them.
+
+    Parameters
+    ----------
+    feet, frame : (n, 3), (n, 3, 3) float
+        Where plants stand, and the axes of their trunks.
+    heights : (n, 2) float
+        Of the lowest and the highest leaves, meters.
+    widths : (n, 2) float
+        Radii of the two rings, meters.
+    foot : (n,) float
+        Radius of the trunk, meters.
+    leaves, wood : (n, 3) float
+        Linear RGB.
+    reach : (n, `SIDES`) float
+        Factors on the radii to all sides.
+    """
     # Of single precision, as screens need no more: seasons go by while one looks on.
     local = np.zeros((len(feet), len(_NORMALS), 3), np.float32)
     for ring, radius in zip((_LOWER, _UPPER), widths.T, strict=True):
