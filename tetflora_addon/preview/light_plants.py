@@ -182,22 +182,18 @@ def crowns_of(flora: Flora, seeds: Seeds) -> Shapes:
         axes,
         forms.astype(np.float32, copy=False),
         seeds.species,
-        _looks_of_kinds(flora, _some_of_each(seeds)),
+        _looks_of_kinds(flora, seeds),
     )
     nothing = np.zeros((0, 3))
     return Shapes(nothing.astype(np.float32), nothing, nothing.astype(np.int32), len(seeds), len(seeds), origin, crowns)
 
 
-def _some_of_each(seeds: Seeds) -> Seeds:
-    """So many plants of each species, by species; some more than once where there are fewer."""
+def _looks_of_kinds(flora: Flora, seeds: Seeds) -> Floats32:
+    """`CrownPoints.looks` of the species of a flora: means over `_SOME` plants of each, of fewer some twice."""
     order = np.argsort(seeds.species.astype(np.int16), kind="stable")  # of so few bits it counts instead of comparing
     number = np.bincount(seeds.species)
     places = (np.arange(_SOME) + 0.5) / _SOME * number[:, None] + (np.cumsum(number) - number)[:, None]
-    return seeds.take(order[places[number > 0].astype(np.int64).ravel()])
-
-
-def _looks_of_kinds(flora: Flora, some: Seeds) -> Floats32:
-    """`CrownPoints.looks` of the species of a flora: means over plants that `_some_of_each` has chosen."""
+    some = seeds.take(order[places[number > 0].astype(np.int64).ravel()])
     looks = np.zeros((len(flora.species), 7), np.float32)
     found = np.column_stack(_looks(flora, trunks(flora.rows, some))).reshape(-1, _SOME, 7)
     looks[some.species[::_SOME]] = found.mean(axis=1)
