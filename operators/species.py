@@ -67,7 +67,7 @@ class TETFLORA_OT_duplicate_species(Reporting, Operator, label="Duplicate as New
 _edited = need(lambda context: edits.find_edit(context.scene, shown(context)), "The species has no changes to revert")
 
 
-class TETFLORA_OT_revert_species(Reporting, Operator, label="Revert", needs=(_edited)):
+class TETFLORA_OT_revert_species(Reporting, Operator, label="Revert", needs=(_edited,)):
     """Discard the changes in this file and restore the species from the catalog.
 
     Deletes a species that exists only in this file.
