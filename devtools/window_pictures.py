@@ -153,10 +153,10 @@ def _brush_panel() -> Any:
     import bpy
 
     tools = next(module for name, module in sys.modules.items() if name.endswith("tetflora.panels.tools"))
-    base = sys.modules[f"{tools.__name__.rpartition('.')[0]}.base"]
 
     def draw(self: Any, context: Any) -> None:
-        tools.PaintTool.draw_settings(context, base.split_layout(self), None)
+        self.layout.use_property_split, self.layout.use_property_decorate = True, False
+        tools.PaintTool.draw_settings(context, self.layout, None)
 
     members = {"bl_label": "Paint Plants", "draw": draw, "__module__": tools.__name__}
     return type("TETFLORA_PT_brush", (bpy.types.Panel,), members)

@@ -4,6 +4,7 @@
 
 import bpy
 from bpy.props import FloatVectorProperty
+from bpy.types import Operator
 
 from ..tetflora_addon.blender.attributes import world_matrix
 from ..tetflora_addon.blender.declare import choice, once, real
@@ -26,14 +27,11 @@ from .base import ModalJob, Reporting, counted, in_object_mode, need, select_onl
 from .layers import ground_found, grounds_to_plant, tell_placed
 
 
-class TETFLORA_OT_add_plant(Reporting, bpy.types.Operator):
+class TETFLORA_OT_add_plant(Reporting, Operator, label="Add Plant", needs=(in_object_mode,)):
     """Add a plant at the 3D cursor.
 
     It is stored as an empty with a species and seed; Refine or rendering creates its branches and leaves.
     """
-
-    bl_label = "Add Plant"
-    needs = (in_object_mode,)
 
     species: choice("Species", "Species from the catalog", operator_items)
     seed: once.integer("Seed", "Individual of the species; random for each plant if not set")
@@ -59,21 +57,20 @@ class TETFLORA_OT_add_plant(Reporting, bpy.types.Operator):
         return {'FINISHED'}
 
 
-class TETFLORA_OT_use_as_skeleton(Reporting, bpy.types.Operator):
+_skeleton_active = need(
+    lambda context: context.active_object is not None and context.active_object.type in SKELETON_TYPES,
+    "The active object must be a curve, hair curves or a mesh of edges; select it last",
+)
+
+
+class TETFLORA_OT_use_as_skeleton(
+    Reporting, Operator, label="Make Plant from Skeleton", needs=(in_object_mode, _skeleton_active)
+):
     """Use the active curve, hair curves or mesh of edges as trunk and limbs of the selected plants or, if none is
     selected, of a new plant in its place; the species grows the rest.
 
     The skeleton is no longer rendered.
     """
-
-    bl_label = "Make Plant from Skeleton"
-    needs = (
-        in_object_mode,
-        need(
-            lambda context: context.active_object is not None and context.active_object.type in SKELETON_TYPES,
-            "The active object must be a curve, hair curves or a mesh of edges; select it last",
-        ),
-    )
 
     def run(self, context: bpy.types.Context) -> set[str]:
         form, depsgraph = context.active_object, context.evaluated_depsgraph_get()
@@ -95,15 +92,12 @@ class TETFLORA_OT_use_as_skeleton(Reporting, bpy.types.Operator):
         return self.done(f'"{form.name}" is now the skeleton of {counted(len(plants), "plant")}: {made}')
 
 
-class TETFLORA_OT_first_forest(Reporting, bpy.types.Operator):
+class TETFLORA_OT_first_forest(Reporting, Operator, label="First Forest", needs=(in_object_mode,)):
     """Create a small complete scene with ground, about ninety plants of four species, camera, sun and sky, ready for
     Refine and F12.
 
     Existing objects remain: if the scene is not empty, a new scene is added.
     """
-
-    bl_label = "First Forest"
-    needs = (in_object_mode,)
 
     seed: once.integer("Seed", "A different seed gives a different forest")
 
@@ -134,14 +128,11 @@ _RULES = properties_of(Rules, options={'SKIP_SAVE'})
 _SHARED = ("by_density", "count", "as_field", "seed", "slope_max", "min_distance", "scale_min", "scale_max")
 
 
-class TETFLORA_OT_populate(ModalJob, bpy.types.Operator):
+class TETFLORA_OT_populate(ModalJob, Operator, label="Scatter", needs=(in_object_mode, ground_found)):
     """Scatter plants over the selected meshes as a new layer, which can be changed later.
 
     Each plant is an empty, or a vertex of one mesh if there are many.
     """
-
-    bl_label = "Scatter"
-    needs = (in_object_mode, ground_found)
 
     by_density: _RULES.by_density
     count: _RULES.count

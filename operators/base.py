@@ -37,15 +37,21 @@ def _told(cls: type, _context: bpy.types.Context, properties: bpy.types.Operator
 
 class Tool:
     """Mix-in for operators: the identifier follows from the class's name, the docstring is the tooltip, and `needs`
-    decides whether the operator is available.
+    decides whether the operator is available. These, the label, options of Blender's, and the choice or switch of
+    which the tooltip tells, where it is set, stand in the head of a class.
     """
 
     needs: tuple[Need, ...] = ()
-    #: Choice or switch of which the tooltip tells, where it is set.
     told = ""
 
-    def __init_subclass__(cls) -> None:
+    def __init_subclass__(
+        cls, label: str = "", needs: tuple[Need, ...] = (), told: str = "", options: set[str] | None = None
+    ) -> None:
         super().__init_subclass__()
+        own = {"bl_label": label, "needs": needs, "told": told, "bl_options": options}
+        for name, value in own.items():
+            if value:
+                setattr(cls, name, value)
         if cls.__name__.startswith("TETFLORA_OT_"):
             cls.bl_idname = cls.__name__.replace("TETFLORA_OT_", "tetflora.", 1)
         if "bl_description" not in vars(cls):

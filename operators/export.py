@@ -4,6 +4,7 @@
 
 import bpy
 from bpy.props import StringProperty
+from bpy.types import Operator
 from bpy_extras.io_utils import ExportHelper
 
 from ..tetflora_addon.blender.declare import once
@@ -16,15 +17,14 @@ from ..tetflora_addon.parameters import within
 from .base import FileJob, FileTool, counted, in_object_mode
 
 
-class TETFLORA_OT_export_forest(FileJob, bpy.types.Operator, ExportHelper):
+class TETFLORA_OT_export_forest(
+    FileJob, Operator, ExportHelper, label="Export Forest", needs=(in_object_mode,), options={'REGISTER'}
+):
     """Write all plants that render as instances of a few, in levels of detail, for other renderers and engines.
 
     Import Tree Inventory reads them back from USD as they were.
     """
 
-    bl_label = "Export Forest"
-    needs = (in_object_mode,)
-    bl_options = {'REGISTER'}
     browse = ExportHelper.invoke
     cancelled = "Cancelled; nothing was written"
 
@@ -67,14 +67,11 @@ class TETFLORA_OT_export_forest(FileJob, bpy.types.Operator, ExportHelper):
         return self.done(". ".join(told), warns=result.problems)
 
 
-class TETFLORA_OT_write_report(FileTool, bpy.types.Operator, ExportHelper):
+class TETFLORA_OT_write_report(FileTool, Operator, ExportHelper, label="Write Report", options={'REGISTER'}):
     """Write versions, cores, memory, settings and the last error to a text file, to report a fault with.
 
     Nothing of the scene is in it, and no names or folders.
     """
-
-    bl_label = "Write Report"
-    bl_options = {'REGISTER'}
 
     filename_ext = ".txt"
     filter_glob: StringProperty(default="*.txt", options={'HIDDEN'})

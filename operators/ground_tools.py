@@ -9,6 +9,7 @@ from math import radians, tau
 
 import bpy
 import numpy as np
+from bpy.types import Operator
 from bpy_extras import view3d_utils
 
 from ..tetflora_addon.blender.declare import choice, once, string
@@ -197,13 +198,11 @@ _KEYS = (
 )
 
 
-class TETFLORA_OT_place_plant(GroundTool, bpy.types.Operator):
+class TETFLORA_OT_place_plant(GroundTool, Operator, label="Place Plants by Clicking"):
     """Click on the ground to add plants one by one, each a different individual.
 
     The wheel rotates, Ctrl and the wheel scale; each plant is one undo step; Esc finishes.
     """
-
-    bl_label = "Place Plants by Clicking"
 
     species: choice("Species", "Species from the catalog", operator_items)
 
@@ -278,13 +277,11 @@ _DOES = {'PAINT': "Add Plants", 'ERASE': "Remove Plants", 'THIN': "Remove Some"}
 _DONE = {'PAINT': "painted", 'ERASE': "erased", 'THIN': "thinned out"}
 
 
-class TETFLORA_OT_paint_plants(GroundTool, bpy.types.Operator):
+class TETFLORA_OT_paint_plants(GroundTool, Operator, label="Paint Plants"):
     """Paint, erase or thin plants with a brush on the visible meshes.
 
     Each stroke is one undo step; Esc or a right click finishes and keeps what was painted.
     """
-
-    bl_label = "Paint Plants"
 
     mode: once.choice("Mode", "Brush mode; that of the panel if not set", MODES)
     stroke: string(

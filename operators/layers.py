@@ -8,6 +8,7 @@ from contextlib import closing
 
 import bpy
 from bpy.props import StringProperty
+from bpy.types import Operator
 from bpy_extras.io_utils import ImportHelper
 
 from ..tetflora_addon.blender.biomes import adding, layers
@@ -78,15 +79,13 @@ def tell_layers(
 Updated = tuple[list[PlacedPlants | growing.GrownStand | int], list[str], list[str]]
 
 
-class TETFLORA_OT_update_layers(ModalJob, bpy.types.Operator):
+class TETFLORA_OT_update_layers(ModalJob, Operator, label="Update", needs=_ACTIVE):
     """Grow layers again by their settings.
 
     Plants that you moved, changed or deleted are replaced too, except where you erased with the brush; plants of other
     layers keep their space. Frozen layers, and stands of which a year is kept, stay as they are.
     """
 
-    bl_label = "Update"
-    needs = _ACTIVE
     cancelled = "Stopped; layers that were done already keep their new plants"
 
     which: once.choice(
@@ -176,14 +175,10 @@ class TETFLORA_OT_update_layers(ModalJob, bpy.types.Operator):
         return tell_layers(self, "", numbers, *rest)
 
 
-class TETFLORA_OT_move_layer(Reporting, bpy.types.Operator):
+class TETFLORA_OT_move_layer(Reporting, Operator, label="Move Layer", told="direction", needs=(layer_exists,)):
     """Move the active layer in the list, a biome with all of its layers; of biomes with limits, those above come
     first.
     """
-
-    bl_label = "Move Layer"
-    told = "direction"
-    needs = (layer_exists,)
 
     direction: choice(
         "Direction",
@@ -236,11 +231,8 @@ class TETFLORA_OT_move_layer(Reporting, bpy.types.Operator):
         return {'FINISHED'}
 
 
-class TETFLORA_OT_duplicate_layer(Reporting, bpy.types.Operator):
+class TETFLORA_OT_duplicate_layer(Reporting, Operator, label="Duplicate Layer", needs=_ACTIVE):
     """Copy the active layer with all of its settings, a biome with its layers; *Update* then grows the copy."""
-
-    bl_label = "Duplicate Layer"
-    needs = _ACTIVE
 
     to_selected: once.boolean(
         "To Selected Meshes", "Let the copy grow on the selected meshes instead of the same ground"
@@ -255,13 +247,10 @@ class TETFLORA_OT_duplicate_layer(Reporting, bpy.types.Operator):
         return self.done(f'"{made.name}" added; click Update to grow it')
 
 
-class TETFLORA_OT_remove_layer(Reporting, bpy.types.Operator):
+class TETFLORA_OT_remove_layer(Reporting, Operator, label="Remove Layer", needs=_ACTIVE):
     """Remove the active layer and its plants, a biome with all of its layers. Plants of frozen layers and stands of
     which a year is kept remain, and so does the ground.
     """
-
-    bl_label = "Remove Layer"
-    needs = _ACTIVE
 
     keep_plants: once.boolean("Keep Plants", "Remove only the layer, and keep its plants as plants of your own")
 
@@ -278,11 +267,8 @@ class TETFLORA_OT_remove_layer(Reporting, bpy.types.Operator):
         return self.done(f'"{name}" removed with {counted(number, "plant")}')
 
 
-class TETFLORA_OT_set_layer_ground(Reporting, bpy.types.Operator):
+class TETFLORA_OT_set_layer_ground(Reporting, Operator, label="Use Selected Meshes", needs=(*_ACTIVE, ground_selected)):
     """Let the active layer grow on the selected meshes, a biome with all of its layers. Click Update to grow it."""
-
-    bl_label = "Use Selected Meshes"
-    needs = (*_ACTIVE, ground_selected)
 
     def run(self, context: bpy.types.Context) -> set[str]:
         layer = layers.active_layer(context.scene)
@@ -292,17 +278,16 @@ class TETFLORA_OT_set_layer_ground(Reporting, bpy.types.Operator):
         return {'FINISHED'}
 
 
-class TETFLORA_OT_ground_snow(Reporting, bpy.types.Operator):
+_may_be_snowy = need(
+    lambda context: active_population(context.scene), "Add a layer first; its ground can then have snow"
+)
+
+
+class TETFLORA_OT_ground_snow(Reporting, Operator, label="Snow on Ground", needs=(in_object_mode, _may_be_snowy)):
     """Add the snow of the scene to the materials of the active layer's ground, as a node before their output.
 
     Soil of Ground Cover needs none of it.
     """
-
-    bl_label = "Snow on Ground"
-    needs = (
-        in_object_mode,
-        need(lambda context: active_population(context.scene), "Add a layer first; its ground can then have snow"),
-    )
 
     def run(self, context: bpy.types.Context) -> set[str]:
         found = cover.cover_with_snow(context.scene, cover.covered_population(context.scene))
@@ -311,14 +296,13 @@ class TETFLORA_OT_ground_snow(Reporting, bpy.types.Operator):
         return self.done(f"{counted(len(found), 'material')} can have snow; set Snow under Season and Wind")
 
 
-class TETFLORA_OT_save_biome(Reporting, bpy.types.Operator):
+_may_be_saved = need(lambda context: saved_populations(context.scene), "Add a layer with plants first")
+
+
+class TETFLORA_OT_save_biome(Reporting, Operator, label="Save as Biome", needs=(_may_be_saved,), options={'REGISTER'}):
     """Save the layers of the active biome to your folder of biomes, for use in all files and to share it; without a
     biome, the layers on the ground of the active one.
     """
-
-    bl_label = "Save as Biome"
-    needs = (need(lambda context: saved_populations(context.scene), "Add a layer with plants first"),)
-    bl_options = {'REGISTER'}
 
     name: string("Name", "Name of the biome, from which that of its file follows")
     description: string("Description", "What grows there, for the tooltip in menus")
@@ -337,14 +321,11 @@ class TETFLORA_OT_save_biome(Reporting, bpy.types.Operator):
         return self.done(f"Saved as {path}")
 
 
-class TETFLORA_OT_add_biome(ModalJob, bpy.types.Operator):
+class TETFLORA_OT_add_biome(ModalJob, Operator, label="Add Biome", needs=(in_object_mode,)):
     """Add a biome with all of its layers of plants, ground cover and soil to the selected meshes.
 
     Without a selected mesh, a hectare of land is made at the 3D cursor.
     """
-
-    bl_label = "Add Biome"
-    needs = (in_object_mode,)
 
     biome: BIOMES()
     seed: once.integer("Seed", "A different seed gives a different arrangement")
@@ -397,18 +378,17 @@ class TETFLORA_OT_add_biome(ModalJob, bpy.types.Operator):
         return tell_layers(self, f'"{result.name}": ', numbers, result.bare, result.kept, more)
 
 
-class TETFLORA_OT_ground_cover(ModalJob, bpy.types.Operator):
+_may_be_covered = need(
+    lambda context: active_population(context.scene), "Add a layer first; its ground is then covered"
+)
+
+
+class TETFLORA_OT_ground_cover(ModalJob, Operator, label="Ground Cover", needs=(in_object_mode, _may_be_covered)):
     """Cover the ground under the active layer with grass, moss and herbs by the light there, and with leaves, branches
     and logs of its species where they fall.
 
     The cover is a layer of its own; use again to renew it after changes above.
     """
-
-    bl_label = "Ground Cover"
-    needs = (
-        in_object_mode,
-        need(lambda context: active_population(context.scene), "Add a layer first; its ground is then covered"),
-    )
 
     soil: boolean(
         "Soil", "Give the ground a material in the colors of what lies there, unless it has one of yours", True
@@ -436,15 +416,12 @@ class TETFLORA_OT_ground_cover(ModalJob, bpy.types.Operator):
         return self.done(f"{counted(result.made.number, 'plant')} cover the ground{kept}")
 
 
-class TETFLORA_OT_grow_stand(ModalJob, bpy.types.Operator):
+class TETFLORA_OT_grow_stand(ModalJob, Operator, label="Grow Stand", needs=(in_object_mode, ground_found)):
     """Grow a wood on the selected meshes, year by year: plants compete for light, die, fall and come up from seed.
 
     The result is one field of plants with its whole history. Change the settings of its years, species and site, then
     use Update.
     """
-
-    bl_label = "Grow Stand"
-    needs = (in_object_mode, ground_found)
 
     def steps(self, context: bpy.types.Context) -> Job[growing.GrownStand]:
         return growing.new_stand_steps(context.scene, context.evaluated_depsgraph_get(), grounds_to_plant(context))
@@ -472,11 +449,8 @@ _OF_STAND = (
 )
 
 
-class TETFLORA_OT_animate_growth(Reporting, bpy.types.Operator):
+class TETFLORA_OT_animate_growth(Reporting, Operator, label="Animate Growth", needs=_OF_STAND):
     """Key the year of the active stand from its first year to its last, and turn on Smooth Growth."""
-
-    bl_label = "Animate Growth"
-    needs = _OF_STAND
 
     first: once.integer("First Frame", "Frame of the first year; that of the scene if not set")
     last: once.integer("Last Frame", "Frame of the last year; that of the scene if not set")
@@ -494,15 +468,12 @@ class TETFLORA_OT_animate_growth(Reporting, bpy.types.Operator):
         return self.done(f"Year {begin:g} at frame {self.first}, year {end:g} at frame {self.last}")
 
 
-class TETFLORA_OT_keep_year(Reporting, bpy.types.Operator):
+class TETFLORA_OT_keep_year(Reporting, Operator, label="Keep Year", needs=_OF_STAND):
     """Keep the active stand as it is in its present year, as an ordinary field of plants, and forget all other years
     and their keys.
 
     The brush and other tools can then change it. Update brings the years back.
     """
-
-    bl_label = "Keep Year"
-    needs = _OF_STAND
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
         text = "All other years of the stand and their keys are removed. Update brings the years back"
@@ -514,11 +485,8 @@ class TETFLORA_OT_keep_year(Reporting, bpy.types.Operator):
         return self.done(f"{counted(number, 'plant')} kept")
 
 
-class TETFLORA_OT_import_biome(FileTool, bpy.types.Operator, ImportHelper):
+class TETFLORA_OT_import_biome(FileTool, Operator, ImportHelper, label="Import Biome", options={'REGISTER'}):
     """Copy a biome's file to your folder of biomes, with the picture of the same name beside it."""
-
-    bl_label = "Import Biome"
-    bl_options = {'REGISTER'}
 
     replace: once.boolean("Replace", "Replace your own biome of the same file name")
 

@@ -6,6 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import bpy
+from bpy.types import Operator
 
 from ..tetflora_addon.blender.assets.marks import can_be_species, is_species, scattered, stop_using, use_as_species
 from ..tetflora_addon.blender.biomes.layers import forget_gone
@@ -51,12 +52,8 @@ _MARKS = {
 }
 
 
-class TETFLORA_OT_mark(Reporting, bpy.types.Operator):
+class TETFLORA_OT_mark(Reporting, Operator, label="Use Selected Objects As", told="what", needs=(in_object_mode,)):
     """Let selected objects be something to TetFlora, or no more."""
-
-    bl_label = "Use Selected Objects As"
-    told = "what"
-    needs = (in_object_mode,)
 
     what: choice(
         "What",
@@ -173,12 +170,10 @@ def _scatterers(context: bpy.types.Context) -> list[bpy.types.Object]:
     return []
 
 
-class TETFLORA_OT_convert_plants(Reporting, bpy.types.Operator):
+class TETFLORA_OT_convert_plants(
+    Reporting, Operator, label="Convert Plants", told="to", needs=(in_object_mode, plants_or_fields_selected)
+):
     """Replace the selected plants with one object whose vertices are the same plants, or take fields apart again."""
-
-    bl_label = "Convert Plants"
-    told = "to"
-    needs = (in_object_mode, plants_or_fields_selected)
 
     to: choice(
         "To",
@@ -234,12 +229,10 @@ class TETFLORA_OT_convert_plants(Reporting, bpy.types.Operator):
         return self.done(f"{counted(len(made), 'plant')} made")
 
 
-class TETFLORA_OT_edit_list(Reporting, bpy.types.Operator):
+class TETFLORA_OT_edit_list(
+    Reporting, Operator, label="Edit List", told="action", options={'REGISTER', 'UNDO', 'INTERNAL'}
+):
     """Add an entry to a list of species, or remove the active one."""
-
-    bl_label = "Edit List"
-    told = "action"
-    bl_options = {'REGISTER', 'UNDO', 'INTERNAL'}
 
     owner: string("Owner", "Where in the context the owner of the list is, such as scene.tetflora.populate")
     entries: string("List", "Name of the list")
@@ -282,14 +275,11 @@ def chosen(context: bpy.types.Context, name: str = "") -> list[Datablock]:
     return list(context.selected_objects)
 
 
-class TETFLORA_OT_use_as_species(Reporting, bpy.types.Operator):
+class TETFLORA_OT_use_as_species(Reporting, Operator, label="Use as Species", told="stop"):
     """Use the selected objects or collections as species: plants of them look as they do.
 
     They are offered wherever species are, in this file. Use again after a change of their shape.
     """
-
-    bl_label = "Use as Species"
-    told = "stop"
 
     collection: once.string("Collection", "Name of a collection to use instead of what is selected")
     variants: boolean(

@@ -7,6 +7,7 @@ from typing import Any
 
 import bpy
 from bpy.props import CollectionProperty, IntProperty, StringProperty
+from bpy.types import Operator
 from bpy_extras.io_utils import ImportHelper
 
 from ..tetflora_addon.blender.declare import once
@@ -115,10 +116,8 @@ class _Raster(_Importing):
         return found | {"files": [{"name": file.name} for file in self.files]}
 
 
-class TETFLORA_OT_import_terrain(_Raster, bpy.types.Operator):
+class TETFLORA_OT_import_terrain(_Raster, Operator, label="Import Terrain"):
     """Make ground from a raster of elevations, or from several tiles of one."""
-
-    bl_label = "Import Terrain"
 
     max_faces: once.integer(
         "Max Faces",
@@ -136,12 +135,10 @@ class TETFLORA_OT_import_terrain(_Raster, bpy.types.Operator):
         return terrain_steps(self.order(context), self.max_faces, _file(self.image))
 
 
-class TETFLORA_OT_import_inventory(_Importing, bpy.types.Operator):
+class TETFLORA_OT_import_inventory(_Importing, Operator, label="Import Tree Inventory"):
     """Make a field of the trees of an inventory, CSV or GeoJSON: species, place and sizes of each. They stand on the
     selected meshes, or on imported terrain. Of USD, make fields of a forest that was exported, or of any points.
     """
-
-    bl_label = "Import Tree Inventory"
 
     filter_glob: StringProperty(default=f"*.csv;*.tsv;*.txt;{_LAYERS};{_FORESTS}", options={'HIDDEN'})
     units: once.choice(
@@ -213,13 +210,11 @@ class TETFLORA_OT_import_inventory(_Importing, bpy.types.Operator):
         return trees.inventory_steps(self.order(context), chosen, self.units, self.skip, trees.columns_in(self.columns))
 
 
-class TETFLORA_OT_import_canopy(_Raster, bpy.types.Operator):
+class TETFLORA_OT_import_canopy(_Raster, Operator, label="Import Canopy Height"):
     """Make a field of the trees that a canopy height model shows, each with its height and the width of its crown.
 
     They stand on the selected meshes, or on imported terrain.
     """
-
-    bl_label = "Import Canopy Height"
 
     species: once.string(
         "Species",
@@ -238,13 +233,11 @@ class TETFLORA_OT_import_canopy(_Raster, bpy.types.Operator):
         return trees.canopy_steps(self.order(context), parse_weights(self.species), self.min_height, _file(self.below))
 
 
-class TETFLORA_OT_import_outlines(_Importing, bpy.types.Operator):
+class TETFLORA_OT_import_outlines(_Importing, Operator, label="Import Outlines"):
     """Make curves of woods, meadows, water, roads and buildings from GeoJSON, a shapefile or a GeoPackage.
 
     They lie on the selected meshes, or on imported terrain. Populations can be limited to them.
     """
-
-    bl_label = "Import Outlines"
 
     filter_glob: StringProperty(default=_LAYERS, options={'HIDDEN'})
     kind: once.choice(

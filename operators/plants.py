@@ -3,6 +3,7 @@
 """Change, re-roll, select and remove plants, and drop them to the ground."""
 
 import bpy
+from bpy.types import Operator
 
 from ..tetflora_addon.blender.biomes.layers import active_layer, children_of, forget_gone
 from ..tetflora_addon.blender.declare import choice, once
@@ -17,14 +18,11 @@ from ..tetflora_addon.parameters import within
 from .base import LINKED, ModalJob, Reporting, counted, in_object_mode, plants_or_fields_selected, selected_plants
 
 
-class TETFLORA_OT_assign_species(Reporting, bpy.types.Operator):
+class TETFLORA_OT_assign_species(Reporting, Operator, label="Change Species", needs=(plants_or_fields_selected,)):
     """Assign this species to all selected plants and to all plants of selected fields.
 
     Seeds, scales and positions do not change.
     """
-
-    bl_label = "Change Species"
-    needs = (plants_or_fields_selected,)
 
     species: choice("Species", "Species from the catalog", operator_items)
 
@@ -38,14 +36,11 @@ class TETFLORA_OT_assign_species(Reporting, bpy.types.Operator):
         return self.done(f"{counted(changed, 'plant')} changed")
 
 
-class TETFLORA_OT_reseed(Reporting, bpy.types.Operator):
+class TETFLORA_OT_reseed(Reporting, Operator, label="Re-roll Seeds", needs=(plants_or_fields_selected,)):
     """Turn each selected plant, and each plant of selected fields, into a different individual of its species.
 
     Copies with the same seed become different.
     """
-
-    bl_label = "Re-roll Seeds"
-    needs = (plants_or_fields_selected,)
 
     roll: once.integer("Roll", "A different number gives different plants", **within(0, 100))
 
@@ -58,11 +53,8 @@ class TETFLORA_OT_reseed(Reporting, bpy.types.Operator):
         return self.done(f"{counted(number, 'plant')} re-rolled")
 
 
-class TETFLORA_OT_select_plants(Reporting, bpy.types.Operator):
+class TETFLORA_OT_select_plants(Reporting, Operator, label="Select Plants", needs=(in_object_mode,)):
     """Select all plants of the same species as the active plant, or those of the active layer."""
-
-    bl_label = "Select Plants"
-    needs = (in_object_mode,)
 
     species: once.string(
         "Species", "Identifier of the species, which need not be in the catalog; that of the active plant if not set"
@@ -95,12 +87,8 @@ class TETFLORA_OT_select_plants(Reporting, bpy.types.Operator):
         return self.done(f"{counted(len(found), 'plant')}{of} selected")
 
 
-class TETFLORA_OT_remove_plants(Reporting, bpy.types.Operator):
+class TETFLORA_OT_remove_plants(Reporting, Operator, label="Remove Plants", told="which", needs=(in_object_mode,)):
     """Delete plants from the scene."""
-
-    bl_label = "Remove Plants"
-    told = "which"
-    needs = (in_object_mode,)
 
     which: choice(
         "Which",
@@ -134,14 +122,13 @@ class TETFLORA_OT_remove_plants(Reporting, bpy.types.Operator):
         return self.done(f"{counted(number, 'plant')} removed")
 
 
-class TETFLORA_OT_drop_to_ground(ModalJob, bpy.types.Operator):
+class TETFLORA_OT_drop_to_ground(
+    ModalJob, Operator, label="Drop Plants to Ground", needs=(in_object_mode, plants_or_fields_selected)
+):
     """Move the selected plants, and the plants of selected fields, vertically to the nearest visible mesh.
 
     Plants, results and refined meshes do not count as ground.
     """
-
-    bl_label = "Drop Plants to Ground"
-    needs = (in_object_mode, plants_or_fields_selected)
 
     def steps(self, context: bpy.types.Context) -> Job[DropResult]:
         fields = [field for field in fields_of(context.selected_objects) if plant_objects.editable(field)]

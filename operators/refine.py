@@ -3,6 +3,7 @@
 """Refine the scene or only the levels of viewports, clear or keep results, convert plants, and clear the cache."""
 
 import bpy
+from bpy.types import Operator
 
 from ..tetflora_addon.blender.declare import once
 from ..tetflora_addon.blender.job import refine
@@ -38,14 +39,14 @@ from .base import (
 _WARNINGS = 4  # about assets, that are told one by one
 
 
-class TETFLORA_OT_refine(ModalJob, bpy.types.Operator):
+_has_camera = need(lambda context: context.scene.camera is not None, NO_CAMERA)
+
+
+class TETFLORA_OT_refine(ModalJob, Operator, label="Refine", needs=(in_object_mode, _has_camera)):
     """Create meshes of plants near the scene camera and proxies of the others, replacing earlier results.
 
     Esc cancels without changes; Return stops refining and creates what has been decided so far.
     """
-
-    bl_label = "Refine"
-    needs = (in_object_mode, need(lambda context: context.scene.camera is not None, NO_CAMERA))
 
     keys = "Esc: Cancel   |   Return: Finish Early"
 
@@ -137,14 +138,11 @@ _clearable = need(
 )
 
 
-class TETFLORA_OT_clear(Reporting, bpy.types.Operator):
+class TETFLORA_OT_clear(Reporting, Operator, label="Clear", needs=(in_object_mode, _clearable)):
     """Remove all meshes, materials and proxies that Refine created, and nothing else.
 
     Plants remain, and hidden meshes are shown again.
     """
-
-    bl_label = "Clear"
-    needs = (in_object_mode, _clearable)
 
     def run(self, context: bpy.types.Context) -> set[str]:
         auto.stop()
@@ -155,17 +153,16 @@ class TETFLORA_OT_clear(Reporting, bpy.types.Operator):
         return self.done(f"{removed}, {counted(shown, 'object')} shown again" if shown else removed)
 
 
-class TETFLORA_OT_keep_results(Reporting, bpy.types.Operator):
+_has_results = need(lambda context: result_collections(context.scene, 'VIEW'), "No results to keep; click Refine first")
+
+
+class TETFLORA_OT_keep_results(
+    Reporting, Operator, label="Keep Results as Meshes", needs=(in_object_mode, _has_results)
+):
     """Turn the results into ordinary meshes that are saved in the file and can be edited.
 
     Refine and Clear no longer change them. Turns off Refine at Render, to avoid rendering the plants twice.
     """
-
-    bl_label = "Keep Results as Meshes"
-    needs = (
-        in_object_mode,
-        need(lambda context: result_collections(context.scene, 'VIEW'), "No results to keep; click Refine first"),
-    )
 
     def run(self, context: bpy.types.Context) -> set[str]:
         scene = context.scene
@@ -179,14 +176,13 @@ class TETFLORA_OT_keep_results(Reporting, bpy.types.Operator):
         return self.done(f"{counted(kept, 'object')} kept as meshes; Refine at Render is off")
 
 
-class TETFLORA_OT_make_plant_mesh(ModalJob, bpy.types.Operator):
+class TETFLORA_OT_make_plant_mesh(
+    ModalJob, Operator, label="Convert Plants to Meshes", needs=(in_object_mode, plants_selected)
+):
     """Create an ordinary mesh object of each selected plant, with every branch and leaf, to edit, export or animate.
 
     The plant remains, but disabled; Clear does not remove the mesh. Esc cancels without changes.
     """
-
-    bl_label = "Convert Plants to Meshes"
-    needs = (in_object_mode, plants_selected)
 
     def steps(self, context: bpy.types.Context) -> Job[list[bpy.types.Object]]:
         return make_plant_mesh_steps(context.scene, context.evaluated_depsgraph_get(), selected_plants(context))
@@ -204,15 +200,13 @@ _camera_found = need(
 )
 
 
-class TETFLORA_OT_preview_levels(ModalJob, bpy.types.Operator):
+class TETFLORA_OT_preview_levels(ModalJob, Operator, label="Compute Levels", needs=(_camera_found,)):
     """Refine for the scene camera, or the frozen one, without creating meshes, and keep every level to step through in
     viewports.
 
     Takes as long as the first part of Refine; Esc cancels and keeps the previous levels.
     """
 
-    bl_label = "Compute Levels"
-    needs = (_camera_found,)
     bl_options = {'REGISTER'}  # nothing in the file changes but the level that is shown
 
     cancelled = "Cancelled; the levels are unchanged"

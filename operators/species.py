@@ -7,6 +7,7 @@ from pathlib import Path
 
 import bpy
 from bpy.props import BoolProperty
+from bpy.types import Operator
 from bpy_extras.io_utils import ExportHelper, ImportHelper
 
 from ..tetflora_addon import storage
@@ -31,11 +32,8 @@ def shown(context: bpy.types.Context) -> str:
 species_shown = need(lambda context: shown(context) in edits.catalog(), "Choose a species from the catalog first")
 
 
-class TETFLORA_OT_duplicate_species(Reporting, bpy.types.Operator):
+class TETFLORA_OT_duplicate_species(Reporting, Operator, label="Duplicate as New Species", needs=(species_shown,)):
     """Duplicate the shown species. The copy belongs to this file until you save it to your species."""
-
-    bl_label = "Duplicate as New Species"
-    needs = (species_shown,)
 
     name: once.string("Name", "Name of the new species; the old name with a number if empty")
     assign: once.boolean("Assign to Selected Plants", "Assign the new species to the selected plants")
@@ -66,16 +64,14 @@ class TETFLORA_OT_duplicate_species(Reporting, bpy.types.Operator):
         return next(name for n in range(2, len(names) + 3) if (name := f"{old} {n}") not in names)
 
 
-class TETFLORA_OT_revert_species(Reporting, bpy.types.Operator):
+_edited = need(lambda context: edits.find_edit(context.scene, shown(context)), "The species has no changes to revert")
+
+
+class TETFLORA_OT_revert_species(Reporting, Operator, label="Revert", needs=(_edited,)):
     """Discard the changes in this file and restore the species from the catalog.
 
     Deletes a species that exists only in this file.
     """
-
-    bl_label = "Revert"
-    needs = (
-        need(lambda context: edits.find_edit(context.scene, shown(context)), "The species has no changes to revert"),
-    )
 
     def run(self, context: bpy.types.Context) -> set[str]:
         editor = context.scene.tetflora.species_editor
@@ -87,12 +83,8 @@ class TETFLORA_OT_revert_species(Reporting, bpy.types.Operator):
         return self.done(f'Species "{identifier}" removed from this file')
 
 
-class TETFLORA_OT_edit_orders(Reporting, bpy.types.Operator):
+class TETFLORA_OT_edit_orders(Reporting, Operator, label="Edit Orders", told="action", needs=(species_shown,)):
     """Add or remove an order of branches or the short shoots of the species."""
-
-    bl_label = "Edit Orders"
-    told = "action"
-    needs = (species_shown,)
 
     action: choice(
         "Action",
@@ -147,25 +139,21 @@ def _remove(data: dict) -> None:
     data["orders"][-1]["branches"] = [0, 0]
 
 
-class TETFLORA_OT_save_species(Reporting, bpy.types.Operator):
+class TETFLORA_OT_save_species(
+    Reporting, Operator, label="Save to My Species", needs=(species_shown,), options={'REGISTER'}
+):
     """Save the species to your species folder, for use in all files.
 
     It replaces a built-in species of the same identifier, and an earlier version of your own.
     """
-
-    bl_label = "Save to My Species"
-    needs = (species_shown,)
-    bl_options = {'REGISTER'}
 
     def run(self, context: bpy.types.Context) -> set[str]:
         path = save_species(context.scene, shown(context))
         return self.done(f"Saved as {path}")
 
 
-class TETFLORA_OT_load_species(FileTool, bpy.types.Operator, ImportHelper):
+class TETFLORA_OT_load_species(FileTool, Operator, ImportHelper, label="Load Species"):
     """Copy a species file to your species folder, to use it in all files."""
-
-    bl_label = "Load Species"
 
     replace: once.boolean("Replace", "Replace your own species of the same file name")
 
@@ -175,12 +163,10 @@ class TETFLORA_OT_load_species(FileTool, bpy.types.Operator, ImportHelper):
         return self.done(f'Species "{edits.catalog()[identifier].name}" loaded')
 
 
-class TETFLORA_OT_export_species(FileTool, bpy.types.Operator, ExportHelper):
+class TETFLORA_OT_export_species(
+    FileTool, Operator, ExportHelper, label="Export Species", needs=(species_shown,), options={'REGISTER'}
+):
     """Export the species to a file, to share it. The file name is the identifier of the species."""
-
-    bl_label = "Export Species"
-    needs = (species_shown,)
-    bl_options = {'REGISTER'}
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
         if not self.filepath:
@@ -192,14 +178,10 @@ class TETFLORA_OT_export_species(FileTool, bpy.types.Operator, ExportHelper):
         return self.done(f"Written to {write_species(context.scene, identifier, self.path)}")
 
 
-class TETFLORA_OT_delete_file(Reporting, bpy.types.Operator):
+class TETFLORA_OT_delete_file(Reporting, Operator, label="Delete from My Files", told="cache", options={'REGISTER'}):
     """Delete the file of the shown species, or of the chosen biome, from your folder. Built-in ones remain. This cannot
     be undone.
     """
-
-    bl_label = "Delete from My Files"
-    told = "cache"
-    bl_options = {'REGISTER'}
 
     biome: once.boolean("Biome", "A biome instead of a species")
     identifier: once.string("File", "Name of the file without its ending; the shown species or chosen biome if empty")
@@ -220,14 +202,11 @@ class TETFLORA_OT_delete_file(Reporting, bpy.types.Operator):
         return self.done(f"{(library.OWN_FILES if self.biome else OWN_FILES).delete(chosen).name} deleted")
 
 
-class TETFLORA_OT_create_asset_library(Reporting, bpy.types.Operator):
+class TETFLORA_OT_create_asset_library(Reporting, Operator, label="Create Asset Library", options={'REGISTER'}):
     """Create a file with one plant of each species, marked as assets with previews, in a folder of your choice.
 
     Assets refer to species by name: using them requires TetFlora and the same species.
     """
-
-    bl_label = "Create Asset Library"
-    bl_options = {'REGISTER'}
 
     directory: string("Folder", "Folder of the library", subtype='DIR_PATH')
     filter_folder: BoolProperty(default=True, options={'HIDDEN', 'SKIP_SAVE'})

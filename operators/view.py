@@ -6,6 +6,7 @@ from math import cos, exp, radians, sin
 
 import bpy
 import numpy as np
+from bpy.types import Operator
 from mathutils import Matrix, Vector
 
 from ..tetflora_addon.blender.declare import choice, real, string
@@ -25,14 +26,11 @@ _TILT = radians(32.0)  # from above
 _SUMMER = 196.0  # day of the year without seasons
 
 
-class TETFLORA_OT_look(Reporting, bpy.types.Operator):
+class TETFLORA_OT_look(Reporting, Operator, label="Look from Here", needs=(in_object_mode,)):
     """Put the camera where this view looks: at eye height on the ground, over it, or as the view is.
 
     A camera is made if there is none; one that is animated stays, and a new one becomes active.
     """
-
-    bl_label = "Look from Here"
-    needs = (in_object_mode,)
 
     where: choice(
         "Where",
@@ -150,13 +148,11 @@ def look_from(space: bpy.types.SpaceView3D, camera: Camera) -> None:
     region.view_matrix = matrix.inverted()
 
 
-class TETFLORA_OT_daylight(Reporting, bpy.types.Operator):
+class TETFLORA_OT_daylight(Reporting, Operator, label="Daylight"):
     """Add a sun and a sky for an hour of the day, by the latitude and the day of the scene; use again to change them.
 
     A sun, lamp or world of your own stays as it is.
     """
-
-    bl_label = "Daylight"
 
     hour: real("Hour", "Hour of the day by the sun, which is in the south at 12", 15.0, **within(0.0, high=24.0))
     clouds: real("Clouds", "How much of the sky is covered: at 1 there are no shadows", **FACTOR)
@@ -241,11 +237,8 @@ def _is_plain(world: bpy.types.World) -> bool:
     return max(color) - min(color) < 1e-4 and max(color) < 0.06
 
 
-class TETFLORA_OT_mend(Reporting, bpy.types.Operator):
+class TETFLORA_OT_mend(Reporting, Operator, label="Mend", options={'REGISTER', 'UNDO', 'INTERNAL'}):
     """Mend what the panel warns of."""
-
-    bl_label = "Mend"
-    bl_options = {'REGISTER', 'UNDO', 'INTERNAL'}
 
     what: string("What", "What to mend, as the panel names it")
 

@@ -1,9 +1,10 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What panels share: their place in the sidebar, layout, rows of properties and buttons, and lists of species."""
+"""What panels and menus share: how functions that draw become these; rows of settings and buttons, lists of species."""
 
+from collections.abc import Callable
 from textwrap import wrap
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import bpy
 from bpy.utils import units
@@ -14,36 +15,63 @@ from .help import draw_help
 #: Scale of the pictures of a gallery where there is room.
 GALLERY = 5.0
 
-
-class _Helped:
-    """Mix-in for panels with a page in the manual, which a button in the header opens."""
-
-    manual: str  # path of the page below docs, and its heading
-
-    def draw_header_preset(self, _context: bpy.types.Context) -> None:
-        draw_help(self.layout, self.manual)
+Draw = Callable[[bpy.types.UILayout, bpy.types.Context], None]
 
 
-class SidebarPanel(_Helped):
-    """Mix-in for panels in the 3D view's sidebar."""
+def panel(
+    label: str,
+    manual: str,
+    tab: str = "",
+    poll: Callable[[bpy.types.Context], object] | None = None,
+    **options: object,
+) -> Callable[[Draw], type[bpy.types.Panel]]:
+    """Make a panel of the function that draws it; labels are to the left of values, as elsewhere in Blender.
 
-    bl_space_type = 'VIEW_3D'
-    bl_region_type = 'UI'
-    bl_category = "TetFlora"
+    Parameters
+    ----------
+    label : str
+    manual : str
+        Page of the manual, and its heading, which a button in the header opens.
+    tab : str
+        Of the Properties editor; the 3D view's sidebar if empty.
+    poll : callable, optional
+        Whether a context has the panel.
+    **options
+        What else panels have, such as ``bl_options``.
+    """
+    place = {"bl_space_type": 'PROPERTIES', "bl_region_type": 'WINDOW', "bl_context": tab}
+    if not tab:
+        place = {"bl_space_type": 'VIEW_3D', "bl_region_type": 'UI', "bl_category": "TetFlora"}
+    place["draw_header_preset"] = lambda self, _context: draw_help(self.layout, self.manual)
+    if poll is not None:
+        place["poll"] = classmethod(lambda _cls, context: bool(poll(context)))
+    return _drawn_by(bpy.types.Panel, {**place, "bl_label": label, "manual": f"manual/{manual}", **options}, True)
 
 
-class PropertiesPanel(_Helped):
-    """Mix-in for panels in the Properties editor; ``bl_context`` names the tab."""
+def popover(label: str, width: int) -> Callable[[Draw], type[bpy.types.Panel]]:
+    """The same of a panel that a button opens, so many units wide."""
+    place = {"bl_space_type": 'VIEW_3D', "bl_region_type": 'HEADER', "bl_options": {'INSTANCED'}}
+    return _drawn_by(bpy.types.Panel, {**place, "bl_label": label, "bl_ui_units_x": width})
 
-    bl_space_type = 'PROPERTIES'
-    bl_region_type = 'WINDOW'
+
+def menu(label: str) -> Callable[[Draw], type[bpy.types.Menu]]:
+    """The same of a menu."""
+    return _drawn_by(bpy.types.Menu, {"bl_label": label})
 
 
-def split_layout(panel: bpy.types.Panel) -> bpy.types.UILayout:
-    """The panel's layout with labels to the left of values, as elsewhere in Blender."""
-    panel.layout.use_property_split = True
-    panel.layout.use_property_decorate = False
-    return panel.layout
+def _drawn_by(kind: type, members: dict[str, object], split: bool = False) -> Callable[[Draw], type]:
+    """A class of a function's name and module, which that draws; split, labels are to the left of values."""
+
+    def made(function: Draw) -> type:
+        def draw(self: Any, context: bpy.types.Context) -> None:
+            if split:
+                self.layout.use_property_split, self.layout.use_property_decorate = True, False
+            function(self.layout, context)
+
+        about = {"draw": draw, "__doc__": function.__doc__, "__module__": function.__module__}
+        return type(function.__name__, (kind,), members | about)
+
+    return made
 
 
 def section(

@@ -13,7 +13,6 @@ from ..tetflora_addon.blender.settings import BIOME, FIELD, SCATTER, active_in
 from ..tetflora_addon.blender.viewport import points
 from .base import (
     Button,
-    SidebarPanel,
     draw_below,
     draw_buttons,
     draw_message,
@@ -21,9 +20,11 @@ from .base import (
     draw_properties,
     draw_species,
     draw_where,
+    menu,
+    panel,
+    popover,
     section,
     shown_length,
-    split_layout,
 )
 
 #: Imports of real places, in the order in which a place is built.
@@ -72,137 +73,118 @@ def _short(number: int) -> str:
     return f"{number / 1e3:.0f} k" if number < 1e6 else f"{number / 1e6:.1f} M"
 
 
-class TETFLORA_MT_add_biome(bpy.types.Menu):
+@menu("TetFlora Biome")
+def TETFLORA_MT_add_biome(layout: bpy.types.UILayout, _context: bpy.types.Context) -> None:
     """Biomes to add to the selected ground, or with land of their own."""
-
-    bl_label = "TetFlora Biome"
-
-    def draw(self, _context: bpy.types.Context) -> None:
-        layout = self.layout
-        layout.operator_context = 'INVOKE_DEFAULT'
-        for info in biomes().values():
-            number = icon_of(info)
-            icon = {"icon_value": number} if number else {"icon": FALLBACK_ICON}
-            layout.operator("tetflora.add_biome", text=info.name, **icon).biome = info.identifier
+    layout.operator_context = 'INVOKE_DEFAULT'
+    for info in biomes().values():
+        number = icon_of(info)
+        icon = {"icon_value": number} if number else {"icon": FALLBACK_ICON}
+        layout.operator("tetflora.add_biome", text=info.name, **icon).biome = info.identifier
 
 
-class TETFLORA_PT_add_layer(bpy.types.Panel):
+@popover("Add Layer", 30)
+def TETFLORA_PT_add_layer(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
     """What can grow on the selected meshes; opened from the list of layers."""
-
-    bl_label = "Add Layer"
-    bl_space_type = 'VIEW_3D'
-    bl_region_type = 'HEADER'
-    bl_options = {'INSTANCED'}
-    bl_ui_units_x = 30
-
-    def draw(self, context: bpy.types.Context) -> None:
-        layout = self.layout
-        grounds = grounds_to_plant(context)
-        more = f" and {len(grounds) - 1:,} more" if len(grounds) > 1 else ""
-        layout.label(text=f"On {grounds[0].name}{more}" if grounds else "Select a mesh to plant on", icon='MESH_GRID')
-        pictures = layout.grid_flow(row_major=True, columns=4, even_columns=True, even_rows=True)
-        known = biomes()
-        for identifier, name, _, icon, _ in items():
-            cell = pictures.column(align=True)
-            cell.template_icon(icon if isinstance(icon, int) else 0, scale=5.0)
-            row = cell.row(align=True)
-            Button("add_biome", 'NONE', name, {"biome": identifier}).draw(row)
-            if identifier in known and known[identifier].is_own:
-                Button("delete_file", 'TRASH', "", {"biome": True, "identifier": identifier}).draw(row)
-        layout.separator()
-        columns = layout.split()
-        draw_buttons(
-            columns.column(),
-            Button("populate", 'OUTLINER_OB_POINTCLOUD', "Scatter", {"by_density": True}),
-            Button("grow_stand", 'TIME', "Stand"),
-            Button("ground_cover", 'OUTLINER_OB_CURVES'),
-            Button("paint_plants", 'BRUSH_DATA'),
-        )
-        draw_buttons(columns.column(), *IMPORTS)
+    grounds = grounds_to_plant(context)
+    more = f" and {len(grounds) - 1:,} more" if len(grounds) > 1 else ""
+    layout.label(text=f"On {grounds[0].name}{more}" if grounds else "Select a mesh to plant on", icon='MESH_GRID')
+    pictures = layout.grid_flow(row_major=True, columns=4, even_columns=True, even_rows=True)
+    known = biomes()
+    for identifier, name, _, icon, _ in items():
+        cell = pictures.column(align=True)
+        cell.template_icon(icon if isinstance(icon, int) else 0, scale=5.0)
+        row = cell.row(align=True)
+        Button("add_biome", 'NONE', name, {"biome": identifier}).draw(row)
+        if identifier in known and known[identifier].is_own:
+            Button("delete_file", 'TRASH', "", {"biome": True, "identifier": identifier}).draw(row)
+    layout.separator()
+    columns = layout.split()
+    draw_buttons(
+        columns.column(),
+        Button("populate", 'OUTLINER_OB_POINTCLOUD', "Scatter", {"by_density": True}),
+        Button("grow_stand", 'TIME', "Stand"),
+        Button("ground_cover", 'OUTLINER_OB_CURVES'),
+        Button("paint_plants", 'BRUSH_DATA'),
+    )
+    draw_buttons(columns.column(), *IMPORTS)
 
 
-class TETFLORA_MT_layers(bpy.types.Menu):
+@menu("Layers")
+def TETFLORA_MT_layers(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
     """Less common operators for layers."""
-
-    bl_label = "Layers"
-
-    def draw(self, context: bpy.types.Context) -> None:
-        layout, layer = self.layout, active_layer(context.scene)
-        draw_buttons(
-            layout,
-            Button("update_layers", 'FILE_REFRESH', "Update This Layer", {"which": 'ACTIVE'}),
-            Button("update_layers", 'LOOP_BACK', "Clear Erased Places", {"which": 'ACTIVE', "forget_erased": True}),
-            Button("ground_cover", 'OUTLINER_OB_CURVES'),
-            Button("ground_snow", 'FREEZE'),
-            None,
-            Button("duplicate_layer", 'DUPLICATE'),
-            Button("duplicate_layer", 'MESH_GRID', "Copy to Selected Meshes", {"to_selected": True}),
-            Button("set_layer_ground", 'MESH_GRID'),
-            Button("move_layer", 'GROUP', "Group with Layer Above", {"direction": 'IN'}),
-            Button("move_layer", 'X', "Take Out of Group", {"direction": 'OUT'}),
-            Button("select_plants", 'RESTRICT_SELECT_OFF', "Select Plants of Layer", {"layer": True}),
-            Button("remove_layer", 'REMOVE', "Remove but Keep Plants", {"keep_plants": True}),
-            None,
-            Button("save_biome", 'FILE_TICK', "Save as Biome..."),
-            Button("import_biome", 'IMPORT', "Import Biome..."),
-        )
-        if layer is None:
-            return
-        layout.separator()
-        layout.prop(layer, "frozen")
-        if layer.kind == SCATTER:
-            draw_properties(layout, layer, "seed", "tilt", "ground_collection")
-            layout.prop_menu_enum(layer, "as_field")
+    layer = active_layer(context.scene)
+    draw_buttons(
+        layout,
+        Button("update_layers", 'FILE_REFRESH', "Update This Layer", {"which": 'ACTIVE'}),
+        Button("update_layers", 'LOOP_BACK', "Clear Erased Places", {"which": 'ACTIVE', "forget_erased": True}),
+        Button("ground_cover", 'OUTLINER_OB_CURVES'),
+        Button("ground_snow", 'FREEZE'),
+        None,
+        Button("duplicate_layer", 'DUPLICATE'),
+        Button("duplicate_layer", 'MESH_GRID', "Copy to Selected Meshes", {"to_selected": True}),
+        Button("set_layer_ground", 'MESH_GRID'),
+        Button("move_layer", 'GROUP', "Group with Layer Above", {"direction": 'IN'}),
+        Button("move_layer", 'X', "Take Out of Group", {"direction": 'OUT'}),
+        Button("select_plants", 'RESTRICT_SELECT_OFF', "Select Plants of Layer", {"layer": True}),
+        Button("remove_layer", 'REMOVE', "Remove but Keep Plants", {"keep_plants": True}),
+        None,
+        Button("save_biome", 'FILE_TICK', "Save as Biome..."),
+        Button("import_biome", 'IMPORT', "Import Biome..."),
+    )
+    if layer is None:
+        return
+    layout.separator()
+    layout.prop(layer, "frozen")
+    if layer.kind == SCATTER:
+        draw_properties(layout, layer, "seed", "tilt", "ground_collection")
+        layout.prop_menu_enum(layer, "as_field")
 
 
-class TETFLORA_PT_layers(SidebarPanel, bpy.types.Panel):
+@panel("Layers", "landscapes.md#layers")
+def TETFLORA_PT_layers(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
     """Layers."""
-
-    bl_label = "Layers"
-    manual = "manual/landscapes.md#layers"
-
-    def draw(self, context: bpy.types.Context) -> None:
-        layout, scene = split_layout(self), context.scene
-        group, layer = scene.tetflora, active_layer(scene)
-        layer = None if layer is None or is_gone(layer) else layer
-        row = layout.row()
-        row.template_list(TETFLORA_UL_layers.__name__, "", group, "layers", group, "layers_index", rows=6)
-        column = row.column(align=True)
-        # Not a popover, which would stay after a click until another one beside it.
-        added = column.operator("wm.call_panel", text="", icon='ADD')
-        added.name, added.keep_open = TETFLORA_PT_add_layer.__name__, False
-        Button("remove_layer", 'REMOVE', "").draw(column)
-        column.separator()
-        for direction in ('UP', 'DOWN'):
-            Button("move_layer", f"TRIA_{direction}", "", {"direction": direction}).draw(column)
-        column.menu(TETFLORA_MT_layers.__name__, text="", icon='DOWNARROW_HLT')
-        row = layout.row(align=True)
-        row.scale_y = 1.2
-        Button("update_layers", 'FILE_REFRESH').draw(row)
-        Button("update_layers", 'MOD_NOISE', "", {"which": 'ACTIVE', "reroll": True}).draw(row)
-        row.prop(context.window_manager, "tetflora_points", text="", icon='PARTICLE_POINT')
-        layout.label(text=_status(layer, len(group.layers) > 0), icon='INFO')
-        if layer is None:
-            return
-        column = layout.column()
-        column.active = not layer.frozen
-        owner = layer.field.tetflora.stand if layer.kind == FIELD and layer.field is not None else layer
-        kind = kind_of(layer)
-        if layer.kind == SCATTER:
-            _draw_scatter(column, layer)
-        elif kind is STAND:
-            _draw_stand(column, layer.field)
-        elif kind is GROUP:
-            column.prop(layer, "gives_way")
-        if (layer.kind != FIELD or kind is STAND) and (body := section(column, "Where", closed=False)):
-            names = [entry.object.name for entry in owner.grounds[:2] if entry.object is not None]
-            more = len(owner.grounds) - 2
-            draw_below(body, ", ".join(names) + (f" and {more:,} more" if more > 0 else "") or "None", "Ground")
-            draw_where(body, owner)
-        if layer.kind == SCATTER and (body := section(column, "Spacing and Size")):
-            _draw_spacing(body, layer)
-            for text in points.complaints(layer):
-                draw_message(context, body, text)
+    scene = context.scene
+    group, layer = scene.tetflora, active_layer(scene)
+    layer = None if layer is None or is_gone(layer) else layer
+    row = layout.row()
+    row.template_list(TETFLORA_UL_layers.__name__, "", group, "layers", group, "layers_index", rows=6)
+    column = row.column(align=True)
+    # Not a popover, which would stay after a click until another one beside it.
+    added = column.operator("wm.call_panel", text="", icon='ADD')
+    added.name, added.keep_open = TETFLORA_PT_add_layer.__name__, False
+    Button("remove_layer", 'REMOVE', "").draw(column)
+    column.separator()
+    for direction in ('UP', 'DOWN'):
+        Button("move_layer", f"TRIA_{direction}", "", {"direction": direction}).draw(column)
+    column.menu(TETFLORA_MT_layers.__name__, text="", icon='DOWNARROW_HLT')
+    row = layout.row(align=True)
+    row.scale_y = 1.2
+    Button("update_layers", 'FILE_REFRESH').draw(row)
+    Button("update_layers", 'MOD_NOISE', "", {"which": 'ACTIVE', "reroll": True}).draw(row)
+    row.prop(context.window_manager, "tetflora_points", text="", icon='PARTICLE_POINT')
+    layout.label(text=_status(layer, len(group.layers) > 0), icon='INFO')
+    if layer is None:
+        return
+    column = layout.column()
+    column.active = not layer.frozen
+    owner = layer.field.tetflora.stand if layer.kind == FIELD and layer.field is not None else layer
+    kind = kind_of(layer)
+    if layer.kind == SCATTER:
+        _draw_scatter(column, layer)
+    elif kind is STAND:
+        _draw_stand(column, layer.field)
+    elif kind is GROUP:
+        column.prop(layer, "gives_way")
+    if (layer.kind != FIELD or kind is STAND) and (body := section(column, "Where", closed=False)):
+        names = [entry.object.name for entry in owner.grounds[:2] if entry.object is not None]
+        more = len(owner.grounds) - 2
+        draw_below(body, ", ".join(names) + (f" and {more:,} more" if more > 0 else "") or "None", "Ground")
+        draw_where(body, owner)
+    if layer.kind == SCATTER and (body := section(column, "Spacing and Size")):
+        _draw_spacing(body, layer)
+        for text in points.complaints(layer):
+            draw_message(context, body, text)
 
 
 def _status(layer: bpy.types.PropertyGroup | None, others: bool) -> str:

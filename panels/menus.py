@@ -8,48 +8,40 @@ from ..operators.places import column_row
 from ..tetflora_addon.blender.runtime import open_menu
 from ..tetflora_addon.blender.species.edits import catalog
 from ..tetflora_addon.species.catalog import FIRST
-from .base import Button, draw_buttons, thumbnail
+from .base import Button, draw_buttons, menu, thumbnail
 from .layers import FALLBACK_ICON, IMPORTS, TETFLORA_MT_add_biome, TETFLORA_MT_layers
-from .preferences import PIE
 
 
-class _SpeciesMenu:
-    """Mix-in for menus with an entry for each species of the catalog, which calls ``operator`` with it."""
-
-    operator: str
-
-    def draw(self, _context: bpy.types.Context) -> None:
-        # Menus execute operators by default; tools need the mouse, and the others have nothing to ask.
-        self.layout.operator_context = 'INVOKE_DEFAULT'
-        known = catalog()
-        for info in known.values():
-            icon = thumbnail(info.identifier)
-            self.layout.operator(f"tetflora.{self.operator}", text=info.name, **icon).species = info.identifier
-            if info.identifier == FIRST:  # the others follow by name
-                self.layout.separator()
-        if not known:
-            self.layout.label(text="The catalog has no species", icon='ERROR')
+def _draw_catalog(layout: bpy.types.UILayout, operator: str) -> None:
+    """An entry for each species of the catalog, which calls an operator with it."""
+    # Menus execute operators by default; tools need the mouse, and the others have nothing to ask.
+    layout.operator_context = 'INVOKE_DEFAULT'
+    known = catalog()
+    for info in known.values():
+        icon = thumbnail(info.identifier)
+        layout.operator(f"tetflora.{operator}", text=info.name, **icon).species = info.identifier
+        if info.identifier == FIRST:  # the others follow by name
+            layout.separator()
+    if not known:
+        layout.label(text="The catalog has no species", icon='ERROR')
 
 
-class TETFLORA_MT_species(_SpeciesMenu, bpy.types.Menu):
+@menu("Change Species")
+def TETFLORA_MT_species(layout: bpy.types.UILayout, _context: bpy.types.Context) -> None:
     """Species to assign to the selected plants."""
-
-    bl_label = "Change Species"
-    operator = "assign_species"
+    _draw_catalog(layout, "assign_species")
 
 
-class TETFLORA_MT_add_plant(_SpeciesMenu, bpy.types.Menu):
+@menu("TetFlora Plant")
+def TETFLORA_MT_add_plant(layout: bpy.types.UILayout, _context: bpy.types.Context) -> None:
     """Species to add a plant of."""
-
-    bl_label = "TetFlora Plant"
-    operator = "add_plant"
+    _draw_catalog(layout, "add_plant")
 
 
-class TETFLORA_MT_place_plant(_SpeciesMenu, bpy.types.Menu):
+@menu("Place Plants by Clicking")
+def TETFLORA_MT_place_plant(layout: bpy.types.UILayout, _context: bpy.types.Context) -> None:
     """Species to place by clicking on the ground."""
-
-    bl_label = "Place Plants by Clicking"
-    operator = "place_plant"
+    _draw_catalog(layout, "place_plant")
 
 
 _POPULATE = Button("populate", 'OUTLINER_OB_POINTCLOUD', "Scatter Plants")
@@ -77,61 +69,52 @@ def draw_in_add_menu(menu: bpy.types.Menu, _context: bpy.types.Context) -> None:
     menu.layout.menu(TETFLORA_MT_add_plant.__name__, icon='OUTLINER_OB_FORCE_FIELD')
 
 
-class TETFLORA_MT_marks(bpy.types.Menu):
+@menu("Use Selected As")
+def TETFLORA_MT_marks(layout: bpy.types.UILayout, _context: bpy.types.Context) -> None:
     """What selected objects are to TetFlora."""
-
-    bl_label = "Use Selected As"
-
-    def draw(self, _context: bpy.types.Context) -> None:
-        draw_buttons(
-            self.layout,
-            Button("mark", 'MOD_MASK', "Occluder, or Not", {"what": 'OCCLUDER'}),
-            Button("mark", 'MESH_ICOSPHERE', "Meshes to Refine, or Not", {"what": 'EXPLICIT'}),
-            Button("mark", 'OUTLINER_OB_POINTCLOUD', "Scatter to Refine, or Not", {"what": 'SCATTER'}),
-            Button("mark", 'POINTCLOUD_DATA', "Field of Plants, or Not", {"what": 'FIELD'}),
-            Button("use_as_skeleton", 'CURVE_DATA'),
-            Button("use_as_species", 'ASSET_MANAGER'),
-            Button("use_as_species", 'X', "Species No More", {"stop": True}),
-        )
+    draw_buttons(
+        layout,
+        Button("mark", 'MOD_MASK', "Occluder, or Not", {"what": 'OCCLUDER'}),
+        Button("mark", 'MESH_ICOSPHERE', "Meshes to Refine, or Not", {"what": 'EXPLICIT'}),
+        Button("mark", 'OUTLINER_OB_POINTCLOUD', "Scatter to Refine, or Not", {"what": 'SCATTER'}),
+        Button("mark", 'POINTCLOUD_DATA', "Field of Plants, or Not", {"what": 'FIELD'}),
+        Button("use_as_skeleton", 'CURVE_DATA'),
+        Button("use_as_species", 'ASSET_MANAGER'),
+        Button("use_as_species", 'X', "Species No More", {"stop": True}),
+    )
 
 
-class TETFLORA_MT_object(bpy.types.Menu):
+@menu("TetFlora")
+def TETFLORA_MT_object(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
     """Operators for plants and ground, also because Blender's search (F3) finds only what a menu lists."""
-
-    bl_label = "TetFlora"
-
-    def draw(self, context: bpy.types.Context) -> None:
-        layout = self.layout
-        draw_species_menu(layout)
-        draw_buttons(
-            layout,
-            Button("reseed", 'FILE_REFRESH'),
-            _DROP,
-            Button("select_plants", 'RESTRICT_SELECT_OFF', "Select All of This Species"),
-            Button("convert_plants", 'POINTCLOUD_DATA', "Convert Plants to Field", {"to": 'FIELD'}),
-            Button("convert_plants", 'OUTLINER_OB_EMPTY', "Convert Field to Objects", {"to": 'OBJECTS'}),
-            Button("make_plant_mesh", 'OUTLINER_OB_MESH'),
-            Button("remove_plants", 'X', "Remove Selected Plants", {"which": 'SELECTED'}),
-            Button("remove_plants", 'TRASH', "Remove All Plants", {"which": 'ALL'}),
-            None,
-        )
-        layout.menu(TETFLORA_MT_marks.__name__)
-        layout.menu(TETFLORA_MT_layers.__name__)
-        draw_buttons(
-            layout, _POPULATE, Button("grow_stand", 'TIME'), Button("ground_cover", 'OUTLINER_OB_CURVES'), _PAINT
-        )
-        draw_place_menu(layout)
-        layout.prop(context.scene.tetflora.species_editor, "shown", text="Species Editor")
-        draw_buttons(
-            layout,
-            None,
-            Button("look", 'VIEW_CAMERA'),
-            Button("daylight", 'LIGHT_SUN'),
-            Button("preview_levels", 'MOD_REMESH'),
-            Button("refine", 'MOD_DECIM', "Refine Plants"),
-            Button("keep_results", 'MESH_DATA'),
-            Button("clear", 'TRASH', "Clear Results"),
-        )
+    draw_species_menu(layout)
+    draw_buttons(
+        layout,
+        Button("reseed", 'FILE_REFRESH'),
+        _DROP,
+        Button("select_plants", 'RESTRICT_SELECT_OFF', "Select All of This Species"),
+        Button("convert_plants", 'POINTCLOUD_DATA', "Convert Plants to Field", {"to": 'FIELD'}),
+        Button("convert_plants", 'OUTLINER_OB_EMPTY', "Convert Field to Objects", {"to": 'OBJECTS'}),
+        Button("make_plant_mesh", 'OUTLINER_OB_MESH'),
+        Button("remove_plants", 'X', "Remove Selected Plants", {"which": 'SELECTED'}),
+        Button("remove_plants", 'TRASH', "Remove All Plants", {"which": 'ALL'}),
+        None,
+    )
+    layout.menu(TETFLORA_MT_marks.__name__)
+    layout.menu(TETFLORA_MT_layers.__name__)
+    draw_buttons(layout, _POPULATE, Button("grow_stand", 'TIME'), Button("ground_cover", 'OUTLINER_OB_CURVES'), _PAINT)
+    draw_place_menu(layout)
+    layout.prop(context.scene.tetflora.species_editor, "shown", text="Species Editor")
+    draw_buttons(
+        layout,
+        None,
+        Button("look", 'VIEW_CAMERA'),
+        Button("daylight", 'LIGHT_SUN'),
+        Button("preview_levels", 'MOD_REMESH'),
+        Button("refine", 'MOD_DECIM', "Refine Plants"),
+        Button("keep_results", 'MESH_DATA'),
+        Button("clear", 'TRASH', "Clear Results"),
+    )
 
 
 def draw_in_object_menu(menu: bpy.types.Menu, _context: bpy.types.Context) -> None:
@@ -178,33 +161,25 @@ def draw_in_export_menu(menu: bpy.types.Menu, _context: bpy.types.Context) -> No
     Button("export_forest", 'OUTLINER_OB_FORCE_FIELD', "TetFlora Forest (.usd, .glb, .obj)").draw(menu.layout)
 
 
-class TETFLORA_MT_pie(bpy.types.Menu):
+@menu("TetFlora")
+def TETFLORA_MT_pie(layout: bpy.types.UILayout, _context: bpy.types.Context) -> None:
     """The pie menu of the 3D view."""
-
-    bl_idname = PIE
-    bl_label = "TetFlora"
-
-    def draw(self, _context: bpy.types.Context) -> None:
-        pie = self.layout.menu_pie()
-        # West, east, south, north, north-west, north-east, south-west, south-east: Blender's own order.
-        draw_buttons(pie, _PAINT, Button("refine", 'MOD_DECIM'), _POPULATE)
-        draw_place_menu(pie)
-        draw_buttons(pie, _DROP, Button("clear", 'TRASH'), _FIRST_FOREST)
-        draw_species_menu(pie)
+    pie = layout.menu_pie()
+    # West, east, south, north, north-west, north-east, south-west, south-east: Blender's own order.
+    draw_buttons(pie, _PAINT, Button("refine", 'MOD_DECIM'), _POPULATE)
+    draw_place_menu(pie)
+    draw_buttons(pie, _DROP, Button("clear", 'TRASH'), _FIRST_FOREST)
+    draw_species_menu(pie)
 
 
-class TETFLORA_MT_nothing_refined(bpy.types.Menu):
+@menu("The Render Shows No Plants")
+def TETFLORA_MT_nothing_refined(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
     """Nothing is refined."""
-
-    bl_idname = "TETFLORA_MT_nothing_refined"
-    bl_label = "The Render Shows No Plants"
-
-    def draw(self, context: bpy.types.Context) -> None:
-        self.layout.label(text="Nothing is refined, and Refine at Render is off", icon='INFO')
-        self.layout.operator("tetflora.refine", icon='MOD_DECIM')
-        self.layout.prop(context.scene.tetflora, "refine_at_render")
+    layout.label(text="Nothing is refined, and Refine at Render is off", icon='INFO')
+    layout.operator("tetflora.refine", icon='MOD_DECIM')
+    layout.prop(context.scene.tetflora, "refine_at_render")
 
 
 def open_nothing_refined() -> None:
     """Open the menu, where there is a window."""
-    open_menu(TETFLORA_MT_nothing_refined.bl_idname)
+    open_menu(TETFLORA_MT_nothing_refined.__name__)

@@ -12,80 +12,63 @@ from ..tetflora_addon.blender.placing.plant_objects import plant_collections
 from ..tetflora_addon.blender.results.proxy_kinds import proxy_kind_of
 from ..tetflora_addon.blender.settings import active_in
 from ..tetflora_addon.blender.viewport import state
-from .base import Button, PropertiesPanel, draw_below, draw_properties, draw_species, section, split_layout
+from .base import Button, draw_below, draw_properties, draw_species, panel, section
 
 
-class TETFLORA_PT_render(PropertiesPanel, bpy.types.Panel):
+@panel("TetFlora", "rendering.md#detail", tab="render")
+def TETFLORA_PT_render(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
     """How finely plants are refined, and as what."""
-
-    bl_label = "TetFlora"
-    manual = "manual/rendering.md#detail"
-    bl_context = "render"
-
-    def draw(self, context: bpy.types.Context) -> None:
-        layout, scene = split_layout(self), context.scene
-        settings, cycles = scene.tetflora, getattr(scene, "cycles", None)
-        layout.prop(settings, "quality")
-        column = layout.column()
-        column.active = not settings.expand_everything
-        names = ("cutoff", "shadow_cutoff", "proxy_kind", "baked_light", "max_polygons", "asset_detail")
-        draw_properties(column, settings, *names)
-        draw_below(column, memory_text(scene), "Memory")
-        form = proxy_kind_of(scene)
-        if form.bounces and cycles is not None:
-            column.prop(cycles, "transparent_max_bounces", text="Transparent")
-        layout.prop(settings, "refine_at_render")
-        row = layout.row()
-        row.active = settings.auto_refine
-        row.prop(settings, "follow_viewport")
-        if body := section(layout, "Animation", switch=(settings, "share_frames")):
-            body.active = settings.share_frames and settings.refine_at_render
-            body.prop(settings, "cell_length")
-            body.prop(scene.render, "use_persistent_data")  # Cycles then loads what frames share only once
-        if body := section(layout, "Leaf Objects"):
-            draw_species(body, settings, "leaf_objects")
+    scene = context.scene
+    settings, cycles = scene.tetflora, getattr(scene, "cycles", None)
+    layout.prop(settings, "quality")
+    column = layout.column()
+    column.active = not settings.expand_everything
+    names = ("cutoff", "shadow_cutoff", "proxy_kind", "baked_light", "max_polygons", "asset_detail")
+    draw_properties(column, settings, *names)
+    draw_below(column, memory_text(scene), "Memory")
+    form = proxy_kind_of(scene)
+    if form.bounces and cycles is not None:
+        column.prop(cycles, "transparent_max_bounces", text="Transparent")
+    layout.prop(settings, "refine_at_render")
+    row = layout.row()
+    row.active = settings.auto_refine
+    row.prop(settings, "follow_viewport")
+    if body := section(layout, "Animation", switch=(settings, "share_frames")):
+        body.active = settings.share_frames and settings.refine_at_render
+        body.prop(settings, "cell_length")
+        body.prop(scene.render, "use_persistent_data")  # Cycles then loads what frames share only once
+    if body := section(layout, "Leaf Objects"):
+        draw_species(body, settings, "leaf_objects")
 
 
-class TETFLORA_PT_output(PropertiesPanel, bpy.types.Panel):
+@panel("TetFlora Results", "rendering.md#output", tab="output", bl_options={'DEFAULT_CLOSED'})
+def TETFLORA_PT_output(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
     """What becomes of results."""
-
-    bl_label = "TetFlora Results"
-    manual = "manual/rendering.md#output"
-    bl_context = "output"
-    bl_options = {'DEFAULT_CLOSED'}
-
-    def draw(self, context: bpy.types.Context) -> None:
-        layout, output = split_layout(self), context.scene.tetflora.output
-        layout.column().prop(output, "results_in")
-        for collection in plant_collections(context.scene):
-            column = layout.column(heading=collection.name)
-            column.prop(collection, "hide_viewport", text="Viewports", toggle=False, invert_checkbox=True)
-            column.prop(collection, "hide_render", text="Renders", toggle=False, invert_checkbox=True)
-        layout.operator("tetflora.keep_results", icon='MESH_DATA')
+    output = context.scene.tetflora.output
+    layout.column().prop(output, "results_in")
+    for collection in plant_collections(context.scene):
+        column = layout.column(heading=collection.name)
+        column.prop(collection, "hide_viewport", text="Viewports", toggle=False, invert_checkbox=True)
+        column.prop(collection, "hide_render", text="Renders", toggle=False, invert_checkbox=True)
+    layout.operator("tetflora.keep_results", icon='MESH_DATA')
 
 
-class TETFLORA_PT_view_layer(PropertiesPanel, bpy.types.Panel):
+@panel("TetFlora Results", "rendering.md#output", tab="view_layer", bl_options={'DEFAULT_CLOSED'})
+def TETFLORA_PT_view_layer(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
     """Rays, pass indices, light groups and materials of results, of all and by species."""
-
-    bl_label = "TetFlora Results"
-    manual = "manual/rendering.md#output"
-    bl_context = "view_layer"
-    bl_options = {'DEFAULT_CLOSED'}
-
-    def draw(self, context: bpy.types.Context) -> None:
-        layout, output, layer = split_layout(self), context.scene.tetflora.output, context.view_layer
-        layout.prop(output, "pass_index")
-        layout.prop_search(output, "light_group", layer, "lightgroups")
-        if body := section(layout, "Ray Visibility"):
-            body.use_property_split = False
-            body.column(align=True).prop(output, "ray_visibility", expand=True)
-        if body := section(layout, "By Species"):
-            draw_species(body, output)
-            if entry := active_in(output, "species"):
-                body.prop(entry, "pass_index")
-                body.prop_search(entry, "light_group", layer, "lightgroups")
-                for name in ("leaf", "blossom", "bark"):
-                    body.prop(entry, name, text=name.capitalize())  # the field itself says Material
+    output, layer = context.scene.tetflora.output, context.view_layer
+    layout.prop(output, "pass_index")
+    layout.prop_search(output, "light_group", layer, "lightgroups")
+    if body := section(layout, "Ray Visibility"):
+        body.use_property_split = False
+        body.column(align=True).prop(output, "ray_visibility", expand=True)
+    if body := section(layout, "By Species"):
+        draw_species(body, output)
+        if entry := active_in(output, "species"):
+            body.prop(entry, "pass_index")
+            body.prop_search(entry, "light_group", layer, "lightgroups")
+            for name in ("leaf", "blossom", "bark"):
+                body.prop(entry, name, text=name.capitalize())  # the field itself says Material
 
 
 def draw_in_overlays(panel: bpy.types.Panel, context: bpy.types.Context) -> None:
@@ -95,36 +78,32 @@ def draw_in_overlays(panel: bpy.types.Panel, context: bpy.types.Context) -> None
     column.prop(context.scene.tetflora.preview, "plants", text="")
 
 
-class TETFLORA_PT_developer(PropertiesPanel, bpy.types.Panel):
+@panel(
+    "TetFlora Statistics",
+    "rendering.md#preview-and-statistics",
+    tab="render",
+    poll=lambda context: context.preferences.view.show_developer_ui,
+    bl_options={'DEFAULT_CLOSED'},
+)
+def TETFLORA_PT_developer(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
     """Levels of refinement in viewports and figures of the last one; with Developer Extras in the preferences."""
-
-    bl_label = "TetFlora Statistics"
-    manual = "manual/rendering.md#preview-and-statistics"
-    bl_context = "render"
-    bl_options = {'DEFAULT_CLOSED'}
-
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        return context.preferences.view.show_developer_ui
-
-    def draw(self, context: bpy.types.Context) -> None:
-        layout, scene = self.layout, context.scene
-        if rows := rows_of(scene.tetflora.statistics):
-            split = layout.split(factor=0.58)
-            names, values = split.column(align=True), split.column(align=True)
-            values.alignment = 'RIGHT'
-            for name, value in rows:
-                names.label(text=name)
-                values.label(text=value)
-        else:
-            layout.label(text="Nothing refined yet", icon='INFO')
-        steps = steps_of(scene.tetflora.statistics)
-        if steps and (body := section(layout, "Passes")):
-            grid = body.grid_flow(row_major=True, columns=5, even_columns=False, align=True)
-            for text in (text for row in (("Pass", "Tetrahedra", "To Split", "Polygons", "s"), *steps) for text in row):
-                grid.label(text=text)
-        if body := section(split_layout(self), "Levels", closed=False):
-            _draw_levels(body, scene)
+    scene = context.scene
+    if rows := rows_of(scene.tetflora.statistics):
+        split = layout.split(factor=0.58)
+        names, values = split.column(align=True), split.column(align=True)
+        values.alignment = 'RIGHT'
+        for name, value in rows:
+            names.label(text=name)
+            values.label(text=value)
+    else:
+        layout.label(text="Nothing refined yet", icon='INFO')
+    steps = steps_of(scene.tetflora.statistics)
+    if steps and (body := section(layout, "Passes")):
+        grid = body.grid_flow(row_major=True, columns=5, even_columns=False, align=True)
+        for text in (text for row in (("Pass", "Tetrahedra", "To Split", "Polygons", "s"), *steps) for text in row):
+            grid.label(text=text)
+    if body := section(layout, "Levels", closed=False):
+        _draw_levels(body, scene)
 
 
 def _draw_levels(layout: bpy.types.UILayout, scene: bpy.types.Scene) -> None:

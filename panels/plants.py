@@ -13,21 +13,17 @@ from ..tetflora_addon.blender.scene.skeletons import SKELETON_TYPES
 from ..tetflora_addon.blender.settings import active_in
 from ..tetflora_addon.blender.species.asset_species import name_of
 from ..tetflora_addon.blender.species.edits import catalog
-from .base import Button, PropertiesPanel, SidebarPanel, draw_below, draw_properties, draw_species, split_layout
+from .base import Button, draw_below, draw_properties, draw_species, panel
 
 
-class TETFLORA_PT_plant(SidebarPanel, bpy.types.Panel):
+@panel(
+    "Plant",
+    "plants.md#single-plants",
+    poll=lambda context: context.active_object is not None and context.active_object.tetflora.is_plant,
+)
+def TETFLORA_PT_plant(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
     """The active plant."""
-
-    bl_label = "Plant"
-    manual = "manual/plants.md#single-plants"
-
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        return context.active_object is not None and context.active_object.tetflora.is_plant
-
-    def draw(self, context: bpy.types.Context) -> None:
-        draw_plant(split_layout(self), context.scene, context.active_object, "seed", "age")
+    draw_plant(layout, context.scene, context.active_object, "seed", "age")
 
 
 def draw_plant(layout: bpy.types.UILayout, scene: bpy.types.Scene, obj: bpy.types.Object, *names: str) -> None:
@@ -46,43 +42,38 @@ def _draw_missing(layout: bpy.types.UILayout, species: set[str]) -> None:
         layout.label(text=f'"{name_of(one)}" is not in the catalog', icon='ERROR')
 
 
-class TETFLORA_PT_object(PropertiesPanel, bpy.types.Panel):
+@panel("TetFlora", "models.md", tab="object")
+def TETFLORA_PT_object(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
     """What the active object is: a plant, a field, ground, an asset."""
-
-    bl_label = "TetFlora"
-    manual = "manual/models.md"
-    bl_context = "object"
-
-    def draw(self, context: bpy.types.Context) -> None:
-        # Not the context's active object, which is none while results hide it.
-        layout, obj = split_layout(self), context.view_layer.objects.active
-        if obj is None:
-            return
-        group = obj.tetflora
-        if group.is_plant:
-            draw_plant(layout, context.scene, obj, "seed", "enabled", "skeleton", "age")
-            return
-        if group.is_field:
-            _draw_field(layout.column(), obj)
-            if group.stand.is_grown:
-                layout.prop(group.stand, "seed")
-        column = layout.column(heading="Use As")
-        if obj.type == 'MESH':
-            column.prop(group, "is_occluder")
-        if can_be_explicit(obj) or group.is_explicit:
-            column.prop(group, "is_explicit")
-        if may_scatter(obj) or is_scatter(obj):
-            _draw_scatter(column, obj)
-        if can_be_field(obj):
-            text = "Stop Using as Field" if group.is_field else "Use as Field of Plants"
-            Button("mark", 'POINTCLOUD_DATA', text, {"what": 'FIELD'}).draw(layout, depress=group.is_field)
-        if obj.type in SKELETON_TYPES:
-            layout.operator("tetflora.use_as_skeleton", icon='CURVE_DATA')
-        row = layout.row(align=True)
-        used = is_species(obj)
-        Button("use_as_species", 'ASSET_MANAGER', "Use Again as Species" if used else None).draw(row)
-        if used:
-            Button("use_as_species", 'X', "", {"stop": True}).draw(row)
+    # Not the context's active object, which is none while results hide it.
+    obj = context.view_layer.objects.active
+    if obj is None:
+        return
+    group = obj.tetflora
+    if group.is_plant:
+        draw_plant(layout, context.scene, obj, "seed", "enabled", "skeleton", "age")
+        return
+    if group.is_field:
+        _draw_field(layout.column(), obj)
+        if group.stand.is_grown:
+            layout.prop(group.stand, "seed")
+    column = layout.column(heading="Use As")
+    if obj.type == 'MESH':
+        column.prop(group, "is_occluder")
+    if can_be_explicit(obj) or group.is_explicit:
+        column.prop(group, "is_explicit")
+    if may_scatter(obj) or is_scatter(obj):
+        _draw_scatter(column, obj)
+    if can_be_field(obj):
+        text = "Stop Using as Field" if group.is_field else "Use as Field of Plants"
+        Button("mark", 'POINTCLOUD_DATA', text, {"what": 'FIELD'}).draw(layout, depress=group.is_field)
+    if obj.type in SKELETON_TYPES:
+        layout.operator("tetflora.use_as_skeleton", icon='CURVE_DATA')
+    row = layout.row(align=True)
+    used = is_species(obj)
+    Button("use_as_species", 'ASSET_MANAGER', "Use Again as Species" if used else None).draw(row)
+    if used:
+        Button("use_as_species", 'X', "", {"stop": True}).draw(row)
 
 
 def _draw_scatter(layout: bpy.types.UILayout, obj: bpy.types.Object) -> None:

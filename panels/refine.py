@@ -10,39 +10,35 @@ from ..tetflora_addon.blender.results.output import KIND
 from ..tetflora_addon.blender.scene.objects import has_contents, has_plants
 from ..tetflora_addon.blender.viewport import auto
 from ..tetflora_addon.blender.viewport.warnings import Warned, warned
-from .base import Button, SidebarPanel, draw_message, draw_properties, split_layout
+from .base import Button, draw_message, draw_properties, panel, popover
 from .outputs import made_of
 
 _FEW = 200  # objects to look through at every movement of the mouse; a larger scene is not a new one
 
 
-class TETFLORA_PT_refine(SidebarPanel, bpy.types.Panel):
+@panel("Refine", "rendering.md#refine")
+def TETFLORA_PT_refine(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
     """Refine: above the others, because it is what one comes back to."""
-
-    bl_label = "Refine"
-    manual = "manual/rendering.md#refine"
-
-    def draw(self, context: bpy.types.Context) -> None:
-        layout, scene = self.layout, context.scene
-        many = bpy.data.objects[_FEW : _FEW + 1]  # Blender counts them all for their number
-        if not many and not has_contents(scene):
-            column = layout.box().column()
-            column.scale_y = 1.6
-            Button("first_forest", 'WORLD').draw(column)
-            layout.label(text="Then press F12 to render it")
-        row = layout.row(align=True)
-        row.scale_y = 1.4
-        row.operator("tetflora.refine", icon='MOD_DECIM')
-        row.operator("tetflora.clear", text="", icon='TRASH')
-        _draw_warnings(layout.row(align=True), warned(context))
-        # One line each, whatever they say: rows never move under the mouse.
-        layout.label(text=state_of(scene), icon='SORTTIME' if scene.tetflora.auto_refine else 'INFO')
-        expected = forecast_text(scene, context.view_layer).splitlines()
-        layout.label(text=expected[0] if expected else "", icon='TIME' if expected else 'BLANK1')
-        draw_properties(split_layout(self), scene.tetflora, "quality", "refine_at_render", "auto_refine")
-        row = self.layout.row(align=True)
-        Button("look", 'VIEW_CAMERA', values={"where": 'EYE'}).draw(row)
-        Button("daylight", 'LIGHT_SUN').draw(row)
+    scene = context.scene
+    many = bpy.data.objects[_FEW : _FEW + 1]  # Blender counts them all for their number
+    if not many and not has_contents(scene):
+        column = layout.box().column()
+        column.scale_y = 1.6
+        Button("first_forest", 'WORLD').draw(column)
+        layout.label(text="Then press F12 to render it")
+    row = layout.row(align=True)
+    row.scale_y = 1.4
+    row.operator("tetflora.refine", icon='MOD_DECIM')
+    row.operator("tetflora.clear", text="", icon='TRASH')
+    _draw_warnings(layout.row(align=True), warned(context))
+    # One line each, whatever they say: rows never move under the mouse.
+    layout.label(text=state_of(scene), icon='SORTTIME' if scene.tetflora.auto_refine else 'INFO')
+    expected = forecast_text(scene, context.view_layer).splitlines()
+    layout.label(text=expected[0] if expected else "", icon='TIME' if expected else 'BLANK1')
+    draw_properties(layout, scene.tetflora, "quality", "refine_at_render", "auto_refine")
+    row = layout.row(align=True)
+    Button("look", 'VIEW_CAMERA', values={"where": 'EYE'}).draw(row)
+    Button("daylight", 'LIGHT_SUN').draw(row)
 
 
 def _draw_warnings(row: bpy.types.UILayout, found: list[Warned]) -> None:
@@ -60,21 +56,14 @@ def _draw_warnings(row: bpy.types.UILayout, found: list[Warned]) -> None:
     row.popover(panel=TETFLORA_PT_warnings.__name__, text="", icon='COLLAPSEMENU')
 
 
-class TETFLORA_PT_warnings(bpy.types.Panel):
+@popover("Warnings", 18)
+def TETFLORA_PT_warnings(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
     """What is wrong, at length; opened from Refine."""
-
-    bl_label = "Warnings"
-    bl_space_type = 'VIEW_3D'
-    bl_region_type = 'HEADER'
-    bl_options = {'INSTANCED'}
-    bl_ui_units_x = 18
-
-    def draw(self, context: bpy.types.Context) -> None:
-        for one in warned(context):
-            box = self.layout.box()
-            draw_message(context, box, one.text, width=340)
-            if one.button:
-                Button("mend", 'MODIFIER', one.button, {"what": one.key}).draw(box)
+    for one in warned(context):
+        box = layout.box()
+        draw_message(context, box, one.text, width=340)
+        if one.button:
+            Button("mend", 'MODIFIER', one.button, {"what": one.key}).draw(box)
 
 
 def state_of(scene: bpy.types.Scene) -> str:

@@ -17,7 +17,7 @@ from ..tetflora_addon.blender.species.edits import find_edit, problem_of, skippe
 from ..tetflora_addon.blender.viewport import species
 from ..tetflora_addon.species.catalog import ORDER_KEYS
 from ..tetflora_addon.species.species import LEAF_KINDS
-from .base import Button, SidebarPanel, draw_buttons, draw_message, draw_numbers, draw_properties, section, split_layout
+from .base import Button, draw_buttons, draw_message, draw_numbers, draw_properties, menu, panel, section
 
 _MOST_TOLD = 3  # files of the folder that are not used
 # Prefixes of an order's keys about leaves; the others are about branches.
@@ -25,74 +25,65 @@ _LEAVES = ("leaf", "leaves")
 _SHORT = {"count_by_length": "By Length", "leaf_envelope_radius": "Radius"}  # labels that have no room
 
 
-class TETFLORA_MT_species_files(bpy.types.Menu):
+@menu("Species Files")
+def TETFLORA_MT_species_files(layout: bpy.types.UILayout, _context: bpy.types.Context) -> None:
     """Saving, loading, sharing and deleting species."""
-
-    bl_label = "Species Files"
-
-    def draw(self, _context: bpy.types.Context) -> None:
-        layout = self.layout
-        layout.operator_context = 'INVOKE_DEFAULT'
-        draw_buttons(
-            layout,
-            Button("save_species", 'FILE_TICK'),
-            Button("load_species", 'IMPORT'),
-            Button("export_species", 'EXPORT'),
-            None,
-            Button("delete_file", 'TRASH', "Delete from My Species"),
-            None,
-            Button("create_asset_library", 'ASSET_MANAGER'),
-        )
+    layout.operator_context = 'INVOKE_DEFAULT'
+    draw_buttons(
+        layout,
+        Button("save_species", 'FILE_TICK'),
+        Button("load_species", 'IMPORT'),
+        Button("export_species", 'EXPORT'),
+        None,
+        Button("delete_file", 'TRASH', "Delete from My Species"),
+        None,
+        Button("create_asset_library", 'ASSET_MANAGER'),
+    )
 
 
-class TETFLORA_PT_species(SidebarPanel, bpy.types.Panel):
+@panel(
+    "Species Editor",
+    "seasons.md#species-editor",
+    poll=lambda context: context.scene.tetflora.species_editor.shown,
+    bl_category="Species",
+)
+def TETFLORA_PT_species(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
     """Species."""
-
-    bl_label = "Species Editor"
-    manual = "manual/seasons.md#species-editor"
-    bl_category = "Species"
-
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        return context.scene.tetflora.species_editor.shown
-
-    def draw(self, context: bpy.types.Context) -> None:
-        layout = split_layout(self)
-        scene = context.scene
-        editor = scene.tetflora.species_editor
-        identifier = present_species(editor)
-        layout.template_icon_view(editor, "species_choice", show_labels=True, scale=5.0, scale_popup=5.0)
-        row = layout.row(align=True)
-        row.use_property_split = False
-        row.prop(editor, "species_choice", text="")
-        row.operator("tetflora.duplicate_species", text="", icon='DUPLICATE')
-        row.operator("tetflora.revert_species", text="", icon='LOOP_BACK')
-        row.menu(TETFLORA_MT_species_files.__name__, text="", icon='DOWNARROW_HLT')
-        if find_edit(scene, identifier) is not None:
-            layout.label(text="Edited in this file", icon='GREASEPENCIL')
-        else:
-            text = "Saved in your species folder" if own_file(identifier) else "Built-in species"
-            layout.label(text=text, icon='LOCKED')
-        if problem := problem_of(scene, identifier):
-            draw_message(context, layout, problem)
-        for text in skipped_files()[:_MOST_TOLD]:
-            draw_message(context, layout, text)
-        shown = species.switch.shown_in(scene)
-        row = layout.row(align=True)
-        row.use_property_split = False
-        row.prop(context.window_manager, "tetflora_species", icon='HIDE_OFF' if shown else 'HIDE_ON', toggle=True)
-        row.prop(editor, "preview_seed")
-        text, failed = species.message()
-        if shown and text and text != problem:
-            draw_message(context, layout, text, 'ERROR' if failed else 'BLANK1')
-        if not orders_of(editor):
-            return
-        if body := section(layout, "Name, Leaf and Bark"):
-            _draw_whole(body, editor)
-        if body := section(layout, "Branches by Order", closed=False):
-            _draw_orders(body, editor)
-        if body := section(layout, "Leaves of This Order"):
-            _draw_keys(body, editor, leaves=True)
+    scene = context.scene
+    editor = scene.tetflora.species_editor
+    identifier = present_species(editor)
+    layout.template_icon_view(editor, "species_choice", show_labels=True, scale=5.0, scale_popup=5.0)
+    row = layout.row(align=True)
+    row.use_property_split = False
+    row.prop(editor, "species_choice", text="")
+    row.operator("tetflora.duplicate_species", text="", icon='DUPLICATE')
+    row.operator("tetflora.revert_species", text="", icon='LOOP_BACK')
+    row.menu(TETFLORA_MT_species_files.__name__, text="", icon='DOWNARROW_HLT')
+    if find_edit(scene, identifier) is not None:
+        layout.label(text="Edited in this file", icon='GREASEPENCIL')
+    else:
+        text = "Saved in your species folder" if own_file(identifier) else "Built-in species"
+        layout.label(text=text, icon='LOCKED')
+    if problem := problem_of(scene, identifier):
+        draw_message(context, layout, problem)
+    for text in skipped_files()[:_MOST_TOLD]:
+        draw_message(context, layout, text)
+    shown = species.switch.shown_in(scene)
+    row = layout.row(align=True)
+    row.use_property_split = False
+    row.prop(context.window_manager, "tetflora_species", icon='HIDE_OFF' if shown else 'HIDE_ON', toggle=True)
+    row.prop(editor, "preview_seed")
+    text, failed = species.message()
+    if shown and text and text != problem:
+        draw_message(context, layout, text, 'ERROR' if failed else 'BLANK1')
+    if not orders_of(editor):
+        return
+    if body := section(layout, "Name, Leaf and Bark"):
+        _draw_whole(body, editor)
+    if body := section(layout, "Branches by Order", closed=False):
+        _draw_orders(body, editor)
+    if body := section(layout, "Leaves of This Order"):
+        _draw_keys(body, editor, leaves=True)
 
 
 def _draw_whole(layout: bpy.types.UILayout, editor: bpy.types.PropertyGroup) -> None:

@@ -19,7 +19,8 @@ import threading
 import traceback
 from collections import deque
 from collections.abc import Callable
-from typing import Generic, TypeVar
+from concurrent.futures import Future, wait
+from typing import TypeVar
 
 import bpy
 
@@ -32,29 +33,25 @@ _LOOK, _IDLE, _LOOKS = 0.005, 0.05, 400
 _Result = TypeVar("_Result")
 
 
-class _Change(Generic[_Result]):
+class _Change(Future[_Result]):
     """A function that is called once, by whoever comes first; whether anybody waits for its result."""
 
     def __init__(self, function: Callable[[], _Result], waits: bool = True) -> None:
-        self._function, self._waits = function, waits
-        self._mine = threading.Lock()
-        self.done = threading.Event()
-        self.error: BaseException | None = None
-        self.result: _Result | None = None
+        super().__init__()
+        self._function, self._waits, self._mine = function, waits, threading.Lock()
 
     def make(self) -> None:
         """Call the function unless somebody has begun to."""
         if not self._mine.acquire(blocking=False):
             return
         try:
-            self.result = self._function()
+            made = self._function()
             sync_view_layers()
+            self.set_result(made)
         except BaseException as error:  # raised again where it was asked for
-            self.error = error
             if not self._waits:
                 traceback.print_exc()
-        finally:
-            self.done.set()
+            self.set_exception(error)
 
 
 _asked: deque[_Change] = deque()
@@ -103,15 +100,12 @@ def later(function: Callable[[], object]) -> None:
 def _handed_over(function: Callable[[], _Result]) -> _Result:
     change = _Change(function)
     _asked.append(change)
-    if not change.done.wait(_PATIENCE):
+    if not wait([change], _PATIENCE).done:
         change.make()
-        change.done.wait()
-    if change.error is not None:
-        try:
-            raise change.error
-        finally:
-            change.error = None  # else it would hold itself by its traceback
-    return change.result
+    try:
+        return change.result()
+    finally:
+        del change  # an error would hold itself by its traceback
 
 
 def make_changes() -> float:

@@ -102,19 +102,6 @@ def levels_of(flora: Flora, seed: Seeds, number: int = 0, like: tuple[PlantLevel
     return (full, *(_corrected(flora, grown, back, pixel, grids, truth, size) for pixel, size in each))
 
 
-def differences(levels: Sequence[PlantLevel]) -> tuple[PlantLevel, ...]:
-    """Levels of a plant with how far each is off the first one, seen anew."""
-    full, *rest = levels
-    found, grids = [full], _grids(full, 0.0, max((level.pixel for level in rest), default=0.5))
-    truth = _views(grids, full.parts)
-    for level in rest:
-        seen = _views(grids, level.parts)
-        cover = sum(view.cover for view in seen) / sum(view.cover for view in truth) - 1.0
-        color = float(np.abs(_mean_color(seen) / _mean_color(truth) - 1.0).max())
-        found.append(replace(level, cover=cover, color=color, outline=_outlines(seen, truth, grids, level.pixel)))
-    return tuple(found)
-
-
 def _leaves(flora: Flora, grown: list[WholeBranches]) -> tuple[float, float]:
     """Mean length of the leaves of a plant, weighted by area, and their number; of its thinnest wood without any."""
     sums = np.zeros(3)

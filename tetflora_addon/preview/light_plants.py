@@ -116,16 +116,32 @@ def _looks(flora: Flora, trunk: Branches) -> tuple[Floats, Floats, Floats]:
 
 
 def _crowns(
-    feet: Floats,  # (n, 3): where plants stand, meters
-    frame: Floats,  # (n, 3, 3): the axes of their trunks
-    heights: Floats,  # (n, 2): of the lowest and the highest leaves, meters
-    widths: Floats,  # (n, 2): radii of the two rings, meters
-    foot: Floats,  # (n,): radius of the trunk, meters
-    leaves: Floats,  # (n, 3): linear RGB
-    wood: Floats,  # (n, 3)
-    reach: Floats | float = 1.0,  # (n, `SIDES`): factors on the radii to all sides
+    feet: Floats,
+    frame: Floats,
+    heights: Floats,
+    widths: Floats,
+    foot: Floats,
+    leaves: Floats,
+    wood: Floats,
+    reach: Floats | float = 1.0,
 ) -> tuple[Floats32, Floats32]:
-    """Corners (v, 3) of crowns and trunks, and their colors as a screen shows them."""
+    """Corners (v, 3) of crowns and trunks, and their colors as a screen shows them.
+
+    Parameters
+    ----------
+    feet, frame : (n, 3), (n, 3, 3) float
+        Where plants stand, and the axes of their trunks.
+    heights : (n, 2) float
+        Of the lowest and the highest leaves, meters.
+    widths : (n, 2) float
+        Radii of the two rings, meters.
+    foot : (n,) float
+        Radius of the trunk, meters.
+    leaves, wood : (n, 3) float
+        Linear RGB.
+    reach : (n, `SIDES`) float
+        Factors on the radii to all sides.
+    """
     # Of single precision, as screens need no more: seasons go by while one looks on.
     local = np.zeros((len(feet), len(_NORMALS), 3), np.float32)
     for ring, radius in zip((_LOWER, _UPPER), widths.T, strict=True):
@@ -166,22 +182,18 @@ def crowns_of(flora: Flora, seeds: Seeds) -> Shapes:
         axes,
         forms.astype(np.float32, copy=False),
         seeds.species,
-        _looks_of_kinds(flora, _some_of_each(seeds)),
+        _looks_of_kinds(flora, seeds),
     )
     nothing = np.zeros((0, 3))
     return Shapes(nothing.astype(np.float32), nothing, nothing.astype(np.int32), len(seeds), len(seeds), origin, crowns)
 
 
-def _some_of_each(seeds: Seeds) -> Seeds:
-    """So many plants of each species, by species; some more than once where there are fewer."""
+def _looks_of_kinds(flora: Flora, seeds: Seeds) -> Floats32:
+    """`CrownPoints.looks` of the species of a flora: means over `_SOME` plants of each, of fewer some twice."""
     order = np.argsort(seeds.species.astype(np.int16), kind="stable")  # of so few bits it counts instead of comparing
     number = np.bincount(seeds.species)
     places = (np.arange(_SOME) + 0.5) / _SOME * number[:, None] + (np.cumsum(number) - number)[:, None]
-    return seeds.take(order[places[number > 0].astype(np.int64).ravel()])
-
-
-def _looks_of_kinds(flora: Flora, some: Seeds) -> Floats32:
-    """`CrownPoints.looks` of the species of a flora: means over plants that `_some_of_each` has chosen."""
+    some = seeds.take(order[places[number > 0].astype(np.int64).ravel()])
     looks = np.zeros((len(flora.species), 7), np.float32)
     found = np.column_stack(_looks(flora, trunks(flora.rows, some))).reshape(-1, _SOME, 7)
     looks[some.species[::_SOME]] = found.mean(axis=1)

@@ -7,9 +7,9 @@ the extension, and folders of the user's own.
 """
 
 import os
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cache, lru_cache, partial
+from functools import lru_cache, partial
 from pathlib import Path
 from typing import Any
 
@@ -185,34 +185,41 @@ def species_file(path: Path) -> bytes:
 FIRST = "beech"
 
 
+#: Shipped files lie in folders of this one.
+_SHIPPED = Path(__file__).resolve().parent.parent
+
+
 @dataclass(frozen=True)
-class SpeciesInfo:
-    """What a menu shows of a species, without reading it in full."""
+class FileInfo:
+    """What a menu shows of a species or a biome, without reading it in full."""
 
     identifier: str
     name: str
     description: str
     path: Path
 
+    @property
+    def is_own(self) -> bool:
+        """Whether the file is the user's."""
+        return self.path.parent.parent != _SHIPPED
 
-@cache
+
 def builtin_folder() -> Path:
     """Folder of the species files that are shipped."""
-    return Path(__file__).resolve().parent.parent / "catalog"
+    return _SHIPPED / "catalog"
 
 
-def info_of(identifier: str, data: Mapping[str, object], path: Path) -> SpeciesInfo:
-    """What a menu shows of a decoded species, sound or not."""
+def info_of(identifier: str, data: Mapping[str, object], path: Path) -> FileInfo:
+    """What a menu shows of a decoded file, sound or not."""
     name, description = readable(str(data.get("name", "")), NAME).strip(), readable(str(data.get("description", "")))
-    return SpeciesInfo(identifier, name or identifier, description, path)
+    return FileInfo(identifier, name or identifier, description, path)
 
 
-def _info(path: Path) -> SpeciesInfo:
+def _info(path: Path, remedy: str) -> FileInfo:
     try:
-        data = parse_json(species_file(path))
-        return info_of(path.stem, data, path)
+        return info_of(path.stem, parse_json(species_file(path)), path)
     except (SpeciesError, ValueError, AttributeError):
-        return info_of(path.stem, {"description": "This file cannot be read; choose the species to see why"}, path)
+        return info_of(path.stem, {"description": f"This file cannot be read; {remedy} to see why"}, path)
 
 
 @lru_cache(maxsize=256)
@@ -260,12 +267,12 @@ def odd_files(folders: Sequence[Path]) -> list[str]:
     return [readable(f'"{path.name}": {reason}') for folder in folders for path, reason in _files(folder) if reason]
 
 
-def in_order(found: Mapping[str, SpeciesInfo]) -> dict[str, SpeciesInfo]:
+def in_order(found: Mapping[str, FileInfo]) -> dict[str, FileInfo]:
     """Species in the order in which they are offered: `FIRST`, then the others by name."""
     return dict(sorted(found.items(), key=lambda item: (item[0] != FIRST, item[1].name.lower())))
 
 
-def list_species(folders: Sequence[Path] = ()) -> dict[str, SpeciesInfo]:
+def list_species(folders: Sequence[Path] = ()) -> dict[str, FileInfo]:
     """All species by identifier, as `in_order` sorts them.
 
     Parameters
@@ -274,10 +281,15 @@ def list_species(folders: Sequence[Path] = ()) -> dict[str, SpeciesInfo]:
         Folders of the user's own; a file there replaces a shipped one of the same name, and one of a later folder.
         Missing folders are passed over, and so are files that `odd_files` names.
     """
-    found: dict[str, SpeciesInfo] = {}
-    for folder in (builtin_folder(), *reversed(folders)):
-        found |= _listed(folder, _entries(folder))
-    return in_order(found)
+    return in_order(files_in((builtin_folder(), *reversed(folders)), "choose the species"))
+
+
+def files_in(folders: Iterable[Path], remedy: str) -> dict[str, FileInfo]:
+    """Files of folders by identifier, those of later ones instead of others; ``remedy`` tells why one is broken."""
+    found: dict[str, FileInfo] = {}
+    for folder in folders:
+        found |= _listed(folder, _entries(folder), remedy)
+    return found
 
 
 def _entries(folder: Path) -> tuple[tuple[str, int, int, int], ...]:
@@ -291,13 +303,11 @@ def _entries(folder: Path) -> tuple[tuple[str, int, int, int], ...]:
 
 
 @lru_cache(maxsize=64)
-def _listed(folder: Path, _entries: tuple[tuple[str, int, int, int], ...]) -> dict[str, SpeciesInfo]:
-    return {path.stem: _info(path) for path, reason in _files(folder) if not reason}
+def _listed(folder: Path, _entries: tuple[tuple[str, int, int, int], ...], remedy: str) -> dict[str, FileInfo]:
+    return {path.stem: _info(path, remedy) for path, reason in _files(folder) if not reason}
 
 
-def load_species(
-    identifier: str, folders: Sequence[Path] = (), known: Mapping[str, SpeciesInfo] | None = None
-) -> Species:
+def load_species(identifier: str, folders: Sequence[Path] = (), known: Mapping[str, FileInfo] | None = None) -> Species:
     """Read a species; unchanged files are read once.
 
     Parameters

@@ -27,6 +27,7 @@ from tetflora_addon.blender.species.edits import catalog
 from tetflora_addon.blender.stands.growing import keep_year
 from tetflora_addon.blender.worker import run_to_end
 from tetflora_addon.errors import SceneError, TetFloraError
+from tetflora_addon.species import catalog as species_catalog
 from tetflora_addon.species.litter import FALLEN, KIND
 
 pytestmark = pytest.mark.usefixtures("clean_file")
@@ -133,8 +134,8 @@ def test_files_that_have_not_changed_are_read_once(tmp_path, monkeypatch):
     own = tmp_path / "species" / "biomes"
     own.mkdir(parents=True)
     (own / "mine.json").write_text('{"name": "One"}', encoding="utf-8")
-    read, read_whole = [], library.read_whole
-    monkeypatch.setattr(library, "read_whole", lambda path, most: read.append(path.stem) or read_whole(path, most))
+    read, before = [], species_catalog.read_whole
+    monkeypatch.setattr(species_catalog, "read_whole", lambda path, most: read.append(path.stem) or before(path, most))
     assert library.biomes()["mine"].name == "One"
     read.clear()
     assert library.biomes()["mine"].name == "One" and read == []

@@ -106,7 +106,7 @@ def test_a_file_that_goes_away_while_folders_are_looked_at(tmp_path: Path, monke
     monkeypatch.setattr(catalog, "is_regular", lambda path: real(path) and (path.stem != "mine" or not path.unlink()))
     assert "cannot be read" in list_species([tmp_path])["mine"].description
     with pytest.raises(SpeciesError, match=r"mine\.json: cannot be read"):
-        load_species("mine", known={"mine": catalog.SpeciesInfo("mine", "", "", tmp_path / "mine.json")})
+        load_species("mine", known={"mine": catalog.FileInfo("mine", "", "", tmp_path / "mine.json")})
 
 
 def test_names_in_menus_are_short_and_can_be_shown(tmp_path: Path) -> None:

@@ -7,19 +7,17 @@ it. A picture has the file's name and lies beside it.
 """
 
 import time
-from collections.abc import Mapping
-from dataclasses import dataclass
-from functools import cache, lru_cache, partial
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import bpy
 
-from ...errors import NAME, SceneError, readable
-from ...files import is_identifier, is_regular, parse_json, read_whole
-from ...species.catalog import stamp
+from ...errors import SceneError
+from ...files import is_regular, parse_json
+from ...species.catalog import FileInfo, files_in
 from ..declare import HIDDEN, once, string
-from ..file_library import ENDING, MAX_FILE_BYTES, OwnFiles, Pictures
+from ..file_library import OwnFiles, Pictures
 from ..preferences import own_species_folder, species_folders
 from ..species.catalog import Item, number_of
 
@@ -30,8 +28,8 @@ NO_BIOME, FALLBACK_ICON = "NONE", 'WORLD'
 
 # Seconds for which folders are not looked at again: menus and panels ask at each redraw.
 _TRUSTED = 0.0 if bpy.app.background else 1.0
-_seen: tuple[float, dict[str, "BiomeInfo"]] | None = None
-_items: tuple[dict[str, "BiomeInfo"], list[Item]] | None = None
+_seen: tuple[float, dict[str, FileInfo]] | None = None
+_items: tuple[dict[str, FileInfo], list[Item]] | None = None
 _kept: dict[tuple, list[Item]] = {}  # items by content: Blender keeps no copy of the strings of dynamic items
 pictures = Pictures()
 
@@ -56,22 +54,6 @@ def data_of(biome: bpy.types.PropertyGroup) -> dict[str, Any]:
     return data if isinstance(data, dict) else {}
 
 
-@dataclass(frozen=True)
-class BiomeInfo:
-    """What a menu shows of a biome, without reading it in full."""
-
-    identifier: str
-    name: str
-    description: str
-    path: Path
-
-    @property
-    def is_own(self) -> bool:
-        """Whether the file is the user's."""
-        return self.path.parent != builtin_folder()
-
-
-@cache
 def builtin_folder() -> Path:
     """Folder of the biomes that are shipped."""
     return Path(__file__).resolve().parent.parent.parent / FOLDER
@@ -83,30 +65,14 @@ def look_again() -> None:
     _seen = None
 
 
-def biomes() -> dict[str, BiomeInfo]:
+def biomes() -> dict[str, FileInfo]:
     """All biomes by identifier, by name."""
     global _seen
     now = time.monotonic()
     if _seen is None or now - _seen[0] >= _TRUSTED:
-        found = {}
-        for folder in (builtin_folder(), *reversed(_own_folders())):
-            for path in sorted(folder.glob("*" + ENDING)) if folder.is_dir() else ():
-                if is_identifier(path.stem) and is_regular(path):
-                    found[path.stem] = _info(path, stamp(path))
+        found = files_in((builtin_folder(), *reversed(_own_folders())), "add the biome")
         _seen = now, dict(sorted(found.items(), key=lambda item: item[1].name.lower()))
     return _seen[1]
-
-
-@lru_cache(maxsize=256)
-def _info(path: Path, _stamp: tuple[int, int]) -> BiomeInfo:
-    try:
-        data = parse_json(read_whole(path, MAX_FILE_BYTES))
-    except (OSError, ValueError):
-        data = None
-    if not isinstance(data, Mapping):
-        data = {"description": "This file cannot be read; add the biome to see why"}
-    name = readable(str(data.get("name", "")), NAME).strip() or path.stem
-    return BiomeInfo(path.stem, name, readable(str(data.get("description", ""))), path)
 
 
 def picture_file(path: Path) -> Path | None:
@@ -114,7 +80,7 @@ def picture_file(path: Path) -> Path | None:
     return next((one for ending in PICTURES if is_regular(one := path.with_suffix(ending))), None)
 
 
-def icon_of(info: BiomeInfo) -> int:
+def icon_of(info: FileInfo) -> int:
     """Number of a biome's picture for items and layouts, loaded at first use; 0 where it has none."""
     return pictures.icon_of(picture_file(info.path))
 

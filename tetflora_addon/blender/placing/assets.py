@@ -15,7 +15,7 @@ import bpy
 
 from ...errors import SceneError
 from ...files import read_whole, write_whole
-from ...species.catalog import SpeciesInfo, list_species, load_species
+from ...species.catalog import FileInfo, list_species, load_species
 from ..preferences import species_folders
 from ..runtime import Handlers
 from ..saved_files import VERSION, write_blend
@@ -92,7 +92,7 @@ def _names_free(names: set[str]) -> Iterator[None]:
             obj.name = name
 
 
-def _make_asset(obj: bpy.types.Object, info: SpeciesInfo, height: float) -> None:
+def _make_asset(obj: bpy.types.Object, info: FileInfo, height: float) -> None:
     obj.empty_display_type, obj.empty_display_size = 'SINGLE_ARROW', height
     group = obj.tetflora
     group.version, group.is_plant, group.species, group.seed = VERSION, True, info.identifier, 1

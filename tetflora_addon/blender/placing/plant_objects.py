@@ -199,7 +199,18 @@ def add_field(
     collection: bpy.types.Collection | None = None,
     ages: np.ndarray | None = None,
 ) -> bpy.types.Object:
-    """Make one field of the plants of a placement; parameters as of `add_plants_steps`."""
+    """Make one field of the plants of a placement.
+
+    Parameters
+    ----------
+    placement : Placement
+    species : sequence of str
+        Identifiers that ``placement.species`` refers to.
+    collection : bpy.types.Collection, optional
+        Where it goes; the scene's collection for plants if not given.
+    ages : (n,) float, optional
+        Years; all are full-grown if not given.
+    """
     rows = (placement.position, placement.rotation, placement.scale, placement.species, placement.seed)
     return link_field(scene, fields.write_field(FIELD, *rows, species, ages=ages), collection)
 

@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from ...errors import NAME, SpeciesError, readable
 from ...files import is_identifier
-from ...species.catalog import SpeciesInfo
+from ...species.catalog import FileInfo
 from ..declare import boolean, pointer_to, real, string
 
 #: What identifiers of assets begin with.
@@ -119,14 +119,14 @@ def copy_asset(source: TetFloraAssetSpecies, entries: bpy.types.bpy_prop_collect
             setattr(added, prop.identifier, getattr(source, prop.identifier))
 
 
-def asset_infos() -> dict[str, SpeciesInfo]:
+def asset_infos() -> dict[str, FileInfo]:
     """What menus show of asset species."""
-    found: dict[str, SpeciesInfo] = {}
+    found: dict[str, FileInfo] = {}
     for identifier, entry in asset_species().items():
         datablock = entry.object or entry.collection
         what = "Object" if entry.object else "Variants in a collection" if entry.variants else "Collection"
         text = f"{what} of this file, used as it is; {entry.height:.3g} m tall"
-        found[identifier] = SpeciesInfo(identifier, readable(datablock.name, NAME), text, Path())
+        found[identifier] = FileInfo(identifier, readable(datablock.name, NAME), text, Path())
     return found
 
 

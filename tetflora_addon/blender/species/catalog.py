@@ -16,7 +16,7 @@ import numpy as np
 
 from ...errors import NAME, SpeciesError, readable
 from ...files import write_whole
-from ...species.catalog import SpeciesInfo, builtin_folder, checked_identifier, species_file, species_from_json
+from ...species.catalog import FileInfo, builtin_folder, checked_identifier, species_file, species_from_json
 from ..declare import once, string
 from ..file_library import OwnFiles, Pictures, as_text, file_of
 from ..preferences import own_species_folder, species_folders
@@ -116,7 +116,7 @@ def items_for(present: str = "", assets: bool = True) -> list[Item]:
     return _kept[stamp]
 
 
-def _items(known: Mapping[str, SpeciesInfo], icons: Mapping[str, int], present: str) -> list[Item]:
+def _items(known: Mapping[str, FileInfo], icons: Mapping[str, int], present: str) -> list[Item]:
     items = [
         (i.identifier, i.name, i.description, icons[i.identifier] or FALLBACK_ICON, number_of(i.identifier))
         for i in known.values()

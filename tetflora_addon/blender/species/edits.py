@@ -26,8 +26,7 @@ import bpy
 from ...errors import NAME, SpeciesError, readable
 from ...files import is_identifier, parse_json
 from ...species.catalog import (
-    SpeciesInfo,
-    builtin_folder,
+    FileInfo,
     checked_identifier,
     in_order,
     info_of,
@@ -52,9 +51,9 @@ listeners = Listeners()
 
 # In the background nothing is drawn, and scripts expect to find what they have just written.
 _TRUSTED = 0.0 if bpy.app.background else 0.3
-_seen: dict[str, SpeciesInfo] | None = None
+_seen: dict[str, FileInfo] | None = None
 _seen_at = 0.0
-_assets: dict[str, SpeciesInfo] | None = None  # of the open file
+_assets: dict[str, FileInfo] | None = None  # of the open file
 _assets_at = 0.0
 _looking = True  # False within `looked_at_once`
 _read: dict[str, dict[str, Any]] = {}  # decoded files, as long as what was seen is trusted
@@ -68,7 +67,7 @@ class TetFloraSpeciesEdit(bpy.types.PropertyGroup):
     text: string("Text", "The species in JSON, as in a species file")
 
 
-def listed() -> dict[str, SpeciesInfo]:
+def listed() -> dict[str, FileInfo]:
     """Species that files hold, edits aside.
 
     A panel asks for them hundreds of times while it is drawn, so in the window folders are looked at every `_TRUSTED`
@@ -321,7 +320,7 @@ def new_identifier(name: str, taken: Callable[[str], bool]) -> str:
     return identifier
 
 
-def catalog() -> dict[str, SpeciesInfo]:
+def catalog() -> dict[str, FileInfo]:
     """All species that this user or this file has, by identifier, in the order in which they are offered.
 
     Assets are among them; `grown` leaves them out.
@@ -342,16 +341,16 @@ def unknown_text(identifier: str) -> str:
     return f'Unknown species "{readable(identifier, NAME)}"; choose one of {", ".join(catalog())}'
 
 
-def grown() -> dict[str, SpeciesInfo]:
+def grown() -> dict[str, FileInfo]:
     """The species of the catalog that grow, and not the assets."""
     known = listed()
     edited = edited_infos()
     return in_order(known | edited) if edited else known
 
 
-def edited_infos() -> dict[str, SpeciesInfo]:
+def edited_infos() -> dict[str, FileInfo]:
     """What menus show of the species that this file has; the first scene's where scenes disagree."""
-    found: dict[str, SpeciesInfo] = {}
+    found: dict[str, FileInfo] = {}
     for edit in _edits(None):
         if edit.identifier not in found:
             try:
@@ -364,8 +363,7 @@ def edited_infos() -> dict[str, SpeciesInfo]:
 
 def pack(_path: object = None, _other: object = None) -> None:
     """Before a file is written: bring the pages of its collections up to date."""
-    shipped = builtin_folder()
-    own = {name for name, info in listed().items() if info.path.parent != shipped}
+    own = {name for name, info in listed().items() if info.is_own}
     own |= {edit.identifier for edit in edits_of_scenes(None)}
     assets = asset_species()
     for collection in bpy.data.collections:
