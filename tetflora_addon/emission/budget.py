@@ -5,7 +5,8 @@ what refining and expanding will take: seconds, polygons and bytes.
 
 How many polygons and facets an image has follows from the pixels that plants cover: parts are drawn until these are
 full. Where facets are larger, there are fewer, as their area is. Where there are few, they may be finer than they have
-to be: a small image is drawn as a larger one, since what hides facets has to be known as finely as they are. Shells have one size; there, real leaves go to the tetrahedra that gain most by them for each polygon.
+to be: a small image is drawn as a larger one, since what hides facets has to be known as finely as they are. Shells
+have one size; there, real leaves go to the tetrahedra that gain most by them for each polygon.
 
 Estimates look at a few thousand leaves and branches, which stand for all there are (`compiled.sizes.CrownParts`), more
 of them on near plants. Each has a place in the image and a size there, from which follow its polygons, as they do when
