@@ -33,10 +33,9 @@ def _steps(scene):
 
 
 def _until_shown(steps, scene):
-    """Go on until a result is shown and no longer under construction."""
+    """Go on until a result is shown."""
     for _ in steps:
-        found = list(result_collections(scene, 'VIEW'))
-        if found and all("tetflora_unfinished" not in c for c in found):
+        if found := result_collections(scene, 'VIEW'):
             return found[0]
     raise AssertionError("there was no first look")
 
