@@ -16,14 +16,14 @@ pytestmark = pytest.mark.usefixtures("clean_file")
 
 @pytest.fixture
 def scene(monkeypatch):
-    """A far tree on the left, a near one on the right and one beside the image, for which there are two tiles."""
+    """A far tree on the left, a near one on the right and one beside the image, which is drawn in three tiles; the middle is empty."""
     monkeypatch.setattr(refine, "_MANY", 1)
     add_camera(location=(0.0, 0.0, 3.0))
     for seed, (x, y) in enumerate(((-14.0, 60.0), (5.0, 25.0), (40.0, 25.0))):
         add_plant(f"tree {seed}", seed=seed, location=(x, y, 0.0))
     scene = bpy.context.scene
     scene.render.resolution_x, scene.render.resolution_y = 480, 120
-    scene.tetflora.facet = 5.0  # drawn as it is, with the tiles of the first look
+    scene.tetflora.quality = 'DRAFT'
     return scene
 
 
@@ -71,7 +71,7 @@ def test_each_tile_is_coarse_or_fine_and_never_both(scene, swaps):
 def test_the_nearest_tile_comes_first_and_what_is_outside_last(scene, swaps):
     for _ in steps(scene):
         pass
-    assert [tile for tile, *_ in swaps if tile is not None] == [1, 0, 2]
+    assert [tile for tile, *_ in swaps if tile is not None] == [2, 0, 3]
     assert all(lost and got for tile, lost, got in swaps if tile is not None)
 
 
@@ -88,7 +88,7 @@ def test_stopped_in_the_middle_the_picture_is_whole_and_nothing_waits(scene, swa
     until_one_is_sharp(scene, swaps).close()
     (shown,) = result_collections(scene, 'VIEW')
     (tile, lost, got), coarse = swaps[0], sum(primitives([o]) for o in shown.objects)
-    assert tile == 1 and got > lost
+    assert tile == 2 and got > lost
     assert coarse == seen(scene) > got
     assert {o for o in bpy.data.objects if "tetflora_kind" in o} == {*shown.objects}
     assert all(mesh.users for mesh in bpy.data.meshes)

@@ -87,6 +87,7 @@ class _Run:
     form: ProxyKind | None = None
     baking: Baking | None = None
     tiles: int = 0  # into which a first look and what replaces it are divided
+    whole: tuple[Camera, RefinementSettings] | None = None  # of what a first look stands for
 
 
 def left_alone(bound: contents.SceneAssets, plan: AssetPlan) -> Mask:
@@ -416,7 +417,6 @@ def _refine_steps(run: _Run, first_look: bool) -> Job[Statistics]:
     for earlier in result_collections(scene, 'VIEW'):
         adopt_materials(scene, earlier)
     if first_look and refined and statistics.polygons_full > _MANY and not nobody_waits():
-        run.tiles = tiles_of(camera)
         results.first = yield from _first_look(run)
         clock.lap("first look")
     try:
@@ -447,6 +447,7 @@ def _first_look(run: _Run) -> Job[Results]:
     results.origin, results.owners, results.looks = whole.origin, whole.owners, whole.looks
     settings, camera = contents.refinement_settings(whole.scene).first_look(), run.camera.smaller(FIRST_LOOK)
     first = replace(run, results=results, given=replace(run.given, sources=None), settings=settings, camera=camera)
+    first.whole = run.camera, contents.refinement_settings(whole.scene)
     first.originals, first.statistics, first.clock = [*run.originals], Statistics(), Stopwatch()
     try:
         in_main_thread(results.open)
@@ -456,6 +457,7 @@ def _first_look(run: _Run) -> Job[Results]:
         in_main_thread(results.discard)
         raise
     in_main_thread(partial(_replace, first))
+    run.tiles = first.tiles
     return results
 
 
@@ -541,7 +543,10 @@ def _refined(run: _Run, disc: float) -> Job[EmissionInput]:
     seen = Transition(flora, view, detail.leaf_limit, detail.tolerance), detail.facet, facet_weights(flora)
     unseen = detail.coarser, given.occluders, becomes, detail.most, run.settings.shadow_cutoff
     with_all = drawing(flora, refinement, view, *seen, *unseen, clusters)
-    if run.results.first is None or run.tiles == tiles_of(view):  # of a finer image there are more
+    if run.whole is not None:  # as many as that is expected to have
+        pixels = run.whole[0].width * run.whole[0].height / (camera.width * camera.height)
+        run.tiles = tiles_of(fit_to_budget(refinement, *run.whole, times=pixels).camera)
+    if run.whole is not None or run.tiles == tiles_of(view):
         with_all = replace(with_all, tiles=run.tiles)
     return EmissionInput(flora, refinement, camera, with_all, detail.tolerance, originals, disc)
 
