@@ -12,7 +12,7 @@ from ..tetflora_addon.blender.job.forecast import forecast, learn
 from ..tetflora_addon.blender.job.plant_mesh import make_plant_mesh_steps
 from ..tetflora_addon.blender.placing.plant_objects import prepare_scene
 from ..tetflora_addon.blender.results import hiding
-from ..tetflora_addon.blender.results.collection import has_results, result_collections
+from ..tetflora_addon.blender.results.collection import has_results
 from ..tetflora_addon.blender.results.hiding import keep_results
 from ..tetflora_addon.blender.results.proxy_kinds import few_bounces
 from ..tetflora_addon.blender.runtime import failed_frames, is_there, redraw, stop_jobs
@@ -20,7 +20,6 @@ from ..tetflora_addon.blender.scene.lights import read_world
 from ..tetflora_addon.blender.viewport import auto, state
 from ..tetflora_addon.blender.viewport.levels import level_steps
 from ..tetflora_addon.blender.viewport.warnings import cut_off
-from ..tetflora_addon.errors import TetFloraError
 from ..tetflora_addon.jobs import Job
 from ..tetflora_addon.preview.levels import Levels
 from ..tetflora_addon.refinement.loop import Statistics
@@ -153,7 +152,9 @@ class TETFLORA_OT_clear(Reporting, Operator, label="Clear", needs=(in_object_mod
         return self.done(f"{removed}, {counted(shown, 'object')} shown again" if shown else removed)
 
 
-_has_results = need(lambda context: result_collections(context.scene, 'VIEW'), "No results to keep; click Refine first")
+_has_results = need(
+    lambda context: has_results(context.scene), "No results to keep; click Refine, or wait until it is done"
+)
 
 
 class TETFLORA_OT_keep_results(
@@ -168,8 +169,6 @@ class TETFLORA_OT_keep_results(
         scene = context.scene
         auto.stop()
         stop_jobs("the results were kept as meshes")
-        if not result_collections(scene, 'VIEW'):
-            raise TetFloraError("Refine Automatically has not finished; wait, or click Refine")
         kept = keep_results(scene)
         scene.tetflora.refine_at_render = False
         scene.tetflora.statistics = ""

@@ -51,14 +51,31 @@ def steps(ui):
     ui.values["first_look_s"] = time.monotonic() - begun
     ui.values["first"] = polygons(scene)
     yield from ui.picture("first")
-    yield from ui.until(lambda: quiet(scene), 120, "near view")
+    ui.values["parts"] = parts = [ui.values["first"]]
+    while not quiet(scene):
+        if polygons(scene) != parts[-1]:
+            parts.append(polygons(scene))
+            yield from ui.picture(f"part_{len(parts)}")
+        yield 0.1
     ui.values["near"] = polygons(scene)
+    parts.append(ui.values["near"])
     yield from ui.picture("near")
+    yield 2.0  # Blender tells of what was made, and nothing has changed
 
-    uid = complete(scene)[0].session_uid
+    look(space, 20.0, 2.9)
+    yield 0.4
+    ui.values["moved_little"] = polygons(scene)
+    yield from ui.until(lambda: bool(auto.message()), 30, "it begins for the view that has moved a little")
+    looks = set()
+    while not quiet(scene):
+        looks.add(polygons(scene))
+        yield 0.1
+    ui.values["least_meanwhile"] = min(looks)
     look(space, 70.0, 400.0)
-    yield 0.5
-    yield from ui.until(lambda: quiet(scene) and complete(scene)[0].session_uid != uid, 120, "far")
+    yield 0.4
+    ui.values["moving"] = polygons(scene)
+    yield from ui.picture("moving")
+    yield from ui.until(lambda: quiet(scene), 120, "far")
     ui.values["far"] = polygons(scene)
     yield from ui.picture("far")
     ui.values["message"] = auto.message()
@@ -99,13 +116,8 @@ def look(space, tilt, distance):
 
 
 def finished(scene):
-    """Whether a result is shown that is not under construction."""
-    return bool(complete(scene))
-
-
-def complete(scene):
-    """Results that are not under construction: the coarse one stays beside the finer one while that is made."""
-    return [c for c in result_collections(scene, 'VIEW') if "tetflora_unfinished" not in c]
+    """Whether a result is shown."""
+    return bool(result_collections(scene, 'VIEW'))
 
 
 def quiet(scene):
@@ -114,6 +126,6 @@ def quiet(scene):
 
 
 def polygons(scene):
-    """Those of all complete results."""
-    made = [o for c in complete(scene) for o in c.objects if o.type == 'MESH']
+    """Those of all results."""
+    made = [o for c in result_collections(scene, 'VIEW') for o in c.objects if o.type == 'MESH']
     return sum(len(o.data.polygons) for o in made)

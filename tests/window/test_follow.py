@@ -17,6 +17,20 @@ def test_a_coarse_result_comes_first(seen: dict) -> None:
     assert 0 < seen["first"] < seen["near"] / 2
 
 
+def test_it_is_sharp_by_parts(seen: dict) -> None:
+    assert len(seen["parts"]) > 3, "several tiles, one after the other"
+    assert seen["parts"] == sorted(seen["parts"])
+
+
+def test_what_was_made_for_another_view_is_not_seen_while_it_moves(seen: dict) -> None:
+    assert seen["moving"] == 0
+
+
+def test_what_is_sharp_stays_where_the_view_moves_a_little(seen: dict) -> None:
+    assert seen["moved_little"] == seen["near"]
+    assert seen["least_meanwhile"] > seen["near"] / 2
+
+
 def test_a_view_from_afar_needs_fewer_polygons(seen: dict) -> None:
     assert 0 < seen["far"] < seen["near"] / 2
 

@@ -93,7 +93,7 @@ class Detail:
 
 
 def fit_to_budget(
-    result: Refinement, camera: Camera, settings: RefinementSettings, faces: float | None = None
+    result: Refinement, camera: Camera, settings: RefinementSettings, faces: float | None = None, times: float = 1.0
 ) -> Detail:
     """Detail that fits into the budget of the settings.
 
@@ -105,6 +105,8 @@ def fit_to_budget(
     settings : RefinementSettings
     faces : float, optional
         Faces of each proxy tetrahedron; by default proxies are facets or spheres, whose number follows their size.
+    times : float
+        Pixels of the camera for each of the loop's, which may have looked at a smaller image.
     """
     memory = settings.max_memory * 1e9 / BYTES_PER_POLYGON if settings.max_memory else np.inf
     most = (1.0 - RESERVE) * min(memory, settings.max_polygons or np.inf)
@@ -114,7 +116,7 @@ def fit_to_budget(
             return detail
         return replace(detail, refinement=_fitted_shells(result, most, faces), tolerance=np.inf)
     polygons = float(len(result.cell_polygons.polygons))
-    covered = float(contributions(result.cells, result.transmittance)[result.in_view[result.nodes]].sum())
+    covered = times * float(contributions(result.cells, result.transmittance)[result.in_view[result.nodes]].sum())
     number = primitives(covered, camera, settings.facet)
     coarser = relative_side(number, settings.facet)
     left = max(most - polygons, 0.01 * most) if np.isfinite(most) else most

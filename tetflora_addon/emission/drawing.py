@@ -35,8 +35,9 @@ from .frontier import DETAIL, FEW, Canvas, Frontier, FrontierKind, Shown, Waitin
 from .plants import Block, GrownPlants, PlantRows, Transition
 from .polygons import FaceRows, Faces
 
-#: Least width of a tile, pixels, and pixels around it that its coverage knows.
-TILE, AROUND = 240, 64
+#: Least width of a tile, pixels, and pixels around it that its coverage knows. A first look has the tiles of what it
+#: stands for, so that these are narrower; what is so many pixels wide stays whole at their borders.
+TILE, AROUND, AT_BORDER = 240, 64, 4.0
 #: Pixels by which what was made is tested as if it were wider: full pixels are open beside their centers. With none,
 #: 8.3 % of 16 points in each pixel of a wood see what counts as hidden; with .12 they are 7.5 %, so 6.7 %.
 _WIDER = 0.25
@@ -119,10 +120,21 @@ class Drawing:
     shadows: ShadowReach
     shade: Shade
     occluders: Floats  # (t, 3, 3): triangles of opaque polygons, meters
-    covered: Floats  # (columns,): pixels in each column of the image that the loop found covered
+    covered: Floats  # (2, columns): pixels in each column that the loop found covered, as they are and by their sizes
     form: FacetConverter | None = None  # what becomes of facets where they are made; without, they stay what they are
     most: float = np.inf  # polygons and facets that there may be, should what is expected be wrong
     shadow: float = 0.0  # pixels down to which shadows of what is not seen are refined; 0 leaves them coarse
+    tiles: int = 0  # how many, nearest first; 0 for as many as fit, from left to right
+
+    @property
+    def smaller(self) -> float:
+        """Width of its tiles over that of others, where an image is too small to have so many."""
+        return min(self.camera.width / (self.tiles * TILE), 1.0) if self.tiles > 1 else 1.0
+
+
+def tiles_of(camera: Camera) -> int:
+    """How many tiles fit into the image of a camera."""
+    return max(camera.width // TILE, 1)
 
 
 def drawing(
@@ -162,43 +174,56 @@ def drawing(
 
 
 def _covered_columns(result: Refinement, camera: Camera) -> Floats:
-    """Pixels (width,) in each column of the image that the loop found covered, by the middles of its tetrahedra."""
+    """Pixels (2, width) in each column of the image that the loop found covered, by the middles of its tetrahedra.
+
+    The second row is the same over the square meters that a pixel spans there.
+    """
     seen = np.flatnonzero(result.in_view[result.nodes])
     covered = contributions(result.cells, result.transmittance)[seen]
     middle = result.tree.vertices(result.nodes[seen]).mean(axis=1)
     coverage = Coverage(camera, (0, 1))
     column = np.clip(np.nan_to_num(coverage.project(middle)[0]), 0, coverage.width - 1).astype(np.int64)
-    return np.bincount(column, covered, coverage.width)
+    near = covered / np.maximum(camera.extent_around(middle), 1e-9) ** 2
+    return np.stack([np.bincount(column, some, coverage.width) for some in (covered, near)])
 
 
-def drawn_blocks(given: Drawing) -> Iterator[Block | Parts | Shown]:
-    """Everything that is drawn, tile by tile: meshes of plants, facets, and what of other things is drawn as it is."""
-    tiles, outside, shown = _tiles(given)
-    given = replace(given, parts=())
+def drawn_blocks(given: Drawing) -> Iterator[int | Block | Parts | Shown]:
+    """Everything that is drawn, tile by tile: meshes of plants, facets, and what of other things is drawn as it is.
+
+    The number of each tile comes before all of it; what is out of view is the last.
+    """
+    items, outside, shown = _tiles(given)
+    given, beyond = replace(given, parts=()), given.tiles or tiles_of(given.camera)
     yield from shown
-    items: list[tuple] = [(number, *tile) for number, tile in enumerate(tiles)]
     for kind, own in enumerate(outside):
         for run in blocks(len(own), _OUTSIDE_BATCH):
             some = [other.take(slice(0)) for other in outside]
             some[kind] = own.take(run)
-            items.append((len(tiles), None, some, len(some[kind]) / sum(map(len, outside))))
-    del tiles, outside
-    whole = max(len(items), 1)
+            items.append((beyond, None, some, len(some[kind]) / sum(map(len, outside))))
+    del outside
+    numbers, before = [number for number, *_ in items], None
     # What was sent is let go: the parts of all tiles are a fifth of what is there before anything is made of them.
     given_away = (items.pop(0) for _ in range(len(items)))
-    for number, made in enumerate(in_processes(_drawn_tile, given, given_away)):
+    for place, made in enumerate(in_processes(_drawn_tile, given, given_away)):
+        if numbers[place] != before:
+            yield (before := numbers[place])
         while made:
             one = made.pop(0)
-            yield replace(one, fraction=(number + 1) / whole) if isinstance(one, Block) else one
+            yield replace(one, fraction=(place + 1) / len(numbers)) if isinstance(one, Block) else one
 
 
-def _tiles(given: Drawing) -> tuple[list[tuple[tuple[int, int], list[Arrays], float]], list[Arrays], list[Shown]]:
-    """Columns, parts and share of all that may be drawn for each tile, parts out of view, and what is shown already.
+#: Number, columns, parts and share of all that may be drawn of a tile; what is out of view has no columns.
+_Item = tuple[int, tuple[int, int] | None, list[Arrays], float]
 
-    A part belongs to the tile that its middle is in; what is wider than half a tile is opened first.
+
+def _tiles(given: Drawing) -> tuple[list[_Item], list[Arrays], list[Shown]]:
+    """Tiles in the order in which they are drawn, parts out of view, and what is shown already.
+
+    A part belongs to the tile that its middle is in; what is wider than half a tile is opened first, and of a first
+    look what crosses a border, as its parts are on either side when they are fine.
     """
     whole = Coverage(given.camera, (0, 1))
-    number = max(given.camera.width // TILE, 1)
+    number = given.tiles or tiles_of(given.camera)
     ends = np.linspace(0, whole.width, number + 1).astype(np.int64)
     frontier = Frontier(given.kinds, whole, given.facet)
     inside, outside = [], []
@@ -209,7 +234,11 @@ def _tiles(given: Drawing) -> tuple[list[tuple[tuple[int, int], list[Arrays], fl
             prints = whole.of_spheres(pool.center, pool.radius)
             out = whole.outside(prints)
             low, high = np.clip(prints.low[:, 0], 0, whole.width), np.clip(prints.high[:, 0], 0, whole.width)
-            wide = ~out & (high - low > TILE / 2) & kind.can_open(some)
+            wide = high - low > given.smaller * TILE / 2
+            if given.smaller < 1.0:
+                left, right = np.searchsorted(ends[1:-1], [low, high])
+                wide |= (left < right) & (high - low > AT_BORDER)
+            wide &= ~out & kind.can_open(some)
             beyond.append(some.take(np.flatnonzero(out)))
             stay = np.flatnonzero(~out & ~wide)
             middle = np.clip(whole.project(pool.center[stay])[0], 0, whole.width - 1)
@@ -219,17 +248,17 @@ def _tiles(given: Drawing) -> tuple[list[tuple[tuple[int, int], list[Arrays], fl
             some = kind.opened(kind.met(some.take(np.flatnonzero(wide)), frontier.shown))[0]
         inside.append([kind.ordered(type(some).concatenate(found.pop(0))) for _ in range(number)])
         outside.append(kind.ordered(type(some).concatenate(beyond)))
-    tiles, covered = [], given.covered + _LEAST_SHARE * max(given.covered.mean(), 1.0)
+    (covered, near), tiles, away = given.covered, [], {}
+    covered = covered + _LEAST_SHARE * max(covered.mean(), 1.0)
     for tile, (first, end) in enumerate(itertools.pairwise(ends.tolist())):
         own = [of[tile] for of in inside]
         if any(map(len, own)):
-            tiles.append(((first, end), own, float(covered[first:end].sum() / covered.sum())))
-    return tiles, outside, frontier.shown
+            tiles.append((tile, (first, end), own, float(covered[first:end].sum() / covered.sum())))
+            away[tile] = covered[first:end].sum() / max(near[first:end].sum(), 1e-9)
+    return sorted(tiles, key=lambda item: away[item[0]]) if given.tiles else tiles, outside, frontier.shown
 
 
-def _drawn_tile(
-    given: Drawing, item: tuple[int, tuple[int, int] | None, list[Arrays], float]
-) -> list[Block | Parts | Shown]:
+def _drawn_tile(given: Drawing, item: _Item) -> list[Block | Parts | Shown]:
     """All that is drawn of one tile, or of parts that are out of view."""
     number, columns, parts, share = item
     if columns is None:
@@ -252,7 +281,8 @@ class _Tile(Canvas):
     """One tile while it is drawn."""
 
     def __init__(self, given: Drawing, columns: tuple[int, int] | None) -> None:
-        around = None if columns is None else (columns[0] - AROUND, columns[1] + AROUND)
+        more = int(given.smaller * AROUND)
+        around = None if columns is None else (columns[0] - more, columns[1] + more)
         super().__init__(Coverage(given.camera, around or (0, 1)))
         self.given, self.frontier = given, Frontier(given.kinds, self.coverage, given.facet)
         self._facets: dict[tuple[Whose, bool], list[Primitive]] = {}

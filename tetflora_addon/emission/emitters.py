@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
 from functools import partial
+from typing import Self
 
 import numpy as np
 
@@ -41,7 +42,7 @@ class EmissionInput:
     originals: OriginalPolicy | None = None
     disc: float = np.pi  # area that the renderer draws of a sphere of radius 1
     _waiting: list[Parts] = field(default_factory=list, compare=False)
-    _shown: list[Shown] = field(default_factory=list, compare=False)
+    _shown: list[tuple[int, Shown]] = field(default_factory=list, compare=False)  # with their tiles
     # Of what was made: how many facets are seen, and the sum of their areas over those that the drawing asks for.
     _seen: list[tuple[int, float]] = field(default_factory=list, compare=False)
 
@@ -59,33 +60,41 @@ class EmissionInput:
 
         What of other things is drawn as it is can be asked for after that.
         """
+        return (made for made in self.tiles(None) if isinstance(made, Block))
+
+    def tiles(self, proxies: Callable[[Self], Iterator[Buffers]] | None) -> Iterator[int | Block | Buffers]:
+        """The same with the number of each tile before its meshes, and what becomes of its facets after them."""
         if self.drawing is None:
             yield from explicit_blocks(self.flora, self.refinement, self.camera, self.tolerance)
             return
         self._waiting.clear()
         self._shown.clear()
         self._seen.clear()
+        tile = -1
         for made in drawn_blocks(self.drawing):
-            if isinstance(made, Block):
-                yield made
-            elif isinstance(made, Parts):
+            if isinstance(made, Parts):
                 self._waiting.append(made)
                 self._seen.extend((len(facets), made.coarser**2 * len(facets)) for facets, seen in made if seen)
+                yield from () if proxies is None else proxies(self)
+            elif isinstance(made, tuple):
+                self._shown.append((tile, made))
             else:
-                self._shown.append(made)
+                tile = made if isinstance(made, int) else tile
+                yield made
+        self._shown.sort(key=lambda one: one[0])
 
     def polygon_blocks(self) -> Iterator[PolygonBlock]:
         """Polygons of your own meshes that stay, after `mesh_blocks`."""
         if self.drawing is None:
             return polygon_blocks(kept_polygons(self.refinement))
-        rows = FaceRows.concatenate([FaceRows.empty(), *(rows for what, rows in self._shown if what == "face")])
+        rows = FaceRows.concatenate([FaceRows.empty(), *(rows for _, (what, rows) in self._shown if what == "face")])
         return polygon_blocks(rows.whole(self.refinement.polygons.meshes))
 
     def asset_plan(self) -> AssetPlan:
         """Instances of assets that are drawn as they are, after `mesh_blocks`."""
         if self.drawing is None:
             return explicit_plan(self.refinement, self.originals)
-        return AssetPlan.of(self.refinement.assets.placed, self.originals, self._shown)
+        return AssetPlan.of(self.refinement.assets.placed, self.originals, [shown for _, shown in self._shown])
 
     def facet_parts(self, again: bool = False) -> Iterator[Parts]:
         """Facets of all that is drawn as such, block by block, after `mesh_blocks`.

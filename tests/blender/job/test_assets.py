@@ -220,9 +220,9 @@ def test_an_error_while_writing_loses_nothing(monkeypatch):
     def broken(*_arguments):
         raise MemoryError
 
-    for name in ("write_proxies", "write_assets"):
+    for name, writer in (("proxy_writer", lambda *_: broken), ("write_assets", broken)):
         with monkeypatch.context() as patch:
-            patch.setattr(refine, name, broken)
+            patch.setattr(refine, name, writer)
             with pytest.raises(MemoryError):
                 run(scene)
         assert datablocks() == before

@@ -205,7 +205,7 @@ def test_an_error_while_writing_leaves_nothing(monkeypatch):
     def broken(*_arguments):
         raise MemoryError
 
-    monkeypatch.setattr(refine, "write_proxies", broken)
+    monkeypatch.setattr(refine, "proxy_writer", lambda *_: broken)
     with pytest.raises(MemoryError):
         _refine(scene)
     assert datablocks() == before

@@ -330,6 +330,7 @@ def test_undo_and_redo(sources):
 def test_a_carrier_holds_what_geometry_instances_too(clean_file):
     tree = add_mesh("tree")
     results = opened()
+    bpy.context.scene.collection.children.link(results.collection)
     inner = instances.add_instances(results, "inner 000", tree, matrices(), np.arange(4, dtype=np.int32))
     geometry = inner.evaluated_get(depsgraph()).evaluated_geometry()
     bare = Bare("bare", geometry)
@@ -345,6 +346,7 @@ def test_a_carrier_holds_what_geometry_instances_too(clean_file):
     order = [np.lexsort(m[:, :3, 3].T.round(4)) for m in (np.array(found), expected)]
     assert np.array(found)[order[0]] == pytest.approx(expected[order[1]], abs=1e-5)
     before = len(bpy.data.collections)
+    bpy.context.scene.collection.children.unlink(results.collection)
     results.finish()
     remove_results(bpy.context.scene)
     assert before > 0 and not len(bpy.data.collections)

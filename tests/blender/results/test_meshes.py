@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from tetflora_addon import buffers
+from tetflora_addon.blender.attributes import face_offsets, members
 from tetflora_addon.blender.results import meshes
 
 pytestmark = pytest.mark.usefixtures("clean_file")
@@ -18,8 +19,18 @@ def write_mesh(*args):
     return meshes.write_mesh(*args)
 
 
-def read_mesh_arrays(*args):
-    return meshes.read_mesh_arrays(*args)
+def read_mesh_arrays(mesh):
+    """What a mesh has of buffers, as Blender's own collections tell it."""
+    uv = mesh.uv_layers.active
+    return MeshBuffers(
+        members(mesh.vertices, "co", 3),
+        members(mesh.edges, "vertices", 2, np.int32),
+        members(mesh.loops, "vertex_index", dtype=np.int32),
+        members(mesh.loops, "edge_index", dtype=np.int32),
+        face_offsets(mesh),
+        {"UVMap": ("CORNER", members(uv.uv, "vector", 2))} if uv is not None and len(mesh.loops) else {},
+        bool(members(mesh.polygons, "use_smooth", dtype=bool).any()),
+    )
 
 
 def MeshBuffers(*args, **fields):  # noqa: N802 - stands for the class of the enabled extension

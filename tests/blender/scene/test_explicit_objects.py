@@ -152,7 +152,7 @@ def test_a_job_that_is_closed_or_fails_leaves_originals_visible(monkeypatch):
         raise MemoryError
 
     _refine(scene)
-    monkeypatch.setattr(refine, "write_proxies", broken)
+    monkeypatch.setattr(refine, "_write_polygons", broken)
     with pytest.raises(MemoryError):
         _refine(scene)
     assert leaves.hide_render  # earlier results are still there

@@ -5,16 +5,18 @@
 from __future__ import annotations
 
 import json
+import math
 from dataclasses import replace
 
 import bpy
+import numpy as np
 import pytest
 
 from tests.blender.scenes import add_camera, add_mesh, add_plant, datablocks
 from tetflora_addon import jobs
 from tetflora_addon.blender import compat
 from tetflora_addon.blender.job import refine
-from tetflora_addon.blender.results import collection
+from tetflora_addon.blender.results import collection, output
 from tetflora_addon.blender.scene.camera import read_camera
 from tetflora_addon.blender.viewport import auto, levels
 from tetflora_addon.jobs import Progress
@@ -56,6 +58,11 @@ def faces(scene):
 
 def results(scene):
     return collection.result_collections(scene, 'VIEW')
+
+
+def unfinished():
+    """Results that are in no scene yet."""
+    return [c for c in bpy.data.collections if output.PURPOSE in c and not c.users]
 
 
 def test_it_refines_when_it_is_switched_on(scene, monkeypatch):
@@ -163,9 +170,9 @@ def test_a_change_in_the_middle_drops_what_is_half_made(scene, monkeypatch):
     auto._state.due = 0.0
     for _ in range(400):
         auto.tick()
-        if results(scene) and results(scene)[0].objects:
+        if unfinished() and unfinished()[0].objects:
             break
-    assert results(scene)
+    assert unfinished() and not results(scene)
     auto.on_interruption()
     assert datablocks() == before
     assert settle(monkeypatch) > 5
@@ -227,13 +234,13 @@ def test_a_plant_hidden_while_it_works_is_heard_afterwards(scene, monkeypatch):
     assert json.loads(scene.tetflora.statistics)["plants"] == 2
 
 
-def half_make(scene, monkeypatch, collections):
-    """Have it work until so many collections have results, the last of which is not done."""
+def half_make(scene, monkeypatch):
+    """Have it work until there are results that are not done."""
     monkeypatch.setattr(auto, "SLICE", 0.0)
     changed(scene)  # settings as they are
     auto.schedule(scene)
     auto._state.due = 0.0
-    while len(results(scene)) < collections or not results(scene)[-1].objects:
+    while not unfinished() or not unfinished()[0].objects:
         assert auto.tick() is not None
 
 
@@ -242,7 +249,7 @@ def test_clear_takes_away_what_is_half_made_too(scene, monkeypatch):
     scene.tetflora.auto_refine = True
     settle(monkeypatch)
     scene.tetflora.cutoff *= 2.0
-    half_make(scene, monkeypatch, 2)
+    half_make(scene, monkeypatch)
     assert bpy.ops.tetflora.clear() == {'FINISHED'}
     assert datablocks() == before
     assert auto.message() == ""
@@ -265,11 +272,11 @@ def test_what_refine_has_made_is_not_made_again(scene, monkeypatch):
 
 def test_refine_is_alone(scene, monkeypatch):
     scene.tetflora.auto_refine = True
-    half_make(scene, monkeypatch, 1)
+    half_make(scene, monkeypatch)
     assert bpy.ops.tetflora.refine() == {'FINISHED'}
     assert len(results(scene)) == 1
     scene.tetflora.cutoff *= 2.0
-    half_make(scene, monkeypatch, 2)
+    half_make(scene, monkeypatch)
     with auto.paused():  # as the operator does between redraws
         assert auto.tick() == auto._BUSY
         assert len(results(scene)) == 1
@@ -278,14 +285,14 @@ def test_refine_is_alone(scene, monkeypatch):
 
 def test_only_what_is_done_is_kept(scene, monkeypatch):
     scene.tetflora.auto_refine = True
-    half_make(scene, monkeypatch, 1)
-    with pytest.raises(RuntimeError, match="has not finished"):
+    half_make(scene, monkeypatch)
+    with pytest.raises(RuntimeError, match="No results to keep"):
         bpy.ops.tetflora.keep_results()
     assert not results(scene)
     settle(monkeypatch)
     made = {obj.name for obj in results(scene)[0].objects}
     scene.tetflora.cutoff *= 2.0
-    half_make(scene, monkeypatch, 2)
+    half_make(scene, monkeypatch)
     assert bpy.ops.tetflora.keep_results() == {'FINISHED'}
     assert not results(scene)
     assert {obj.name for obj in scene.objects if "tetflora_kind" in obj} == made
@@ -311,9 +318,9 @@ def test_after_an_unexpected_error_it_says_so_and_can_begin_anew(scene, monkeypa
 def test_what_is_deleted_in_the_middle_is_noticed(scene, monkeypatch, what):
     before = datablocks()
     scene.tetflora.auto_refine = True
-    half_make(scene, monkeypatch, 1)
+    half_make(scene, monkeypatch)
     if what == "results":
-        bpy.data.collections.remove(results(scene)[0])
+        bpy.data.collections.remove(unfinished()[0])
     else:
         bpy.data.objects.remove(bpy.data.objects[what])
     settle(monkeypatch)
@@ -480,3 +487,72 @@ def test_a_slice_never_waits_for_the_engine_however_long_the_window_took_to_draw
     auto._state.pace._left -= 9.0  # the last redraw took so long
     assert auto.tick() == auto.SLICE
     auto.stop()
+
+
+def turned(camera, angle, by=0.0):
+    """A view turned around what it looks at, 40 m ahead, and so many meters nearer to that."""
+    c, s = math.cos(angle), math.sin(angle)
+    frame = np.array([(c, -s, 0.0), (s, c, 0.0), (0.0, 0.0, 1.0)]) @ camera.frame
+    middle = camera.position - 40.0 * camera.frame[:, 2]
+    return replace(camera, frame=frame, position=middle + (40.0 - by) * frame[:, 2])
+
+
+@pytest.mark.parametrize(
+    ("angle", "by", "expected"),
+    [(0.0, 0.0, True), (0.01, 0.0, True), (0.0, 12.0, True), (0.2, 0, False), (0, -8, False)],
+)
+def test_views_are_alike_from_the_same_side_and_within_the_image(scene, angle, by, expected):
+    before = read_camera(scene, bpy.context.evaluated_depsgraph_get())
+    assert auto.alike(before, turned(before, angle, by), 40.0 - by) == expected
+
+
+def test_results_go_as_soon_as_the_view_has_moved_much_and_stay_where_it_has_not(scene, monkeypatch):
+    views = [read_camera(scene, bpy.context.evaluated_depsgraph_get())]
+    looks = []
+    original = refine.refine_steps
+    monkeypatch.setattr(auto, "view_camera", lambda _: views[-1])
+    monkeypatch.setattr(
+        refine, "refine_steps", lambda *a, first_look, **k: looks.append(first_look) or original(*a, **k)
+    )
+    scene.tetflora.follow_viewport = scene.tetflora.auto_refine = True
+    auto.watch()
+    settle(monkeypatch)
+    made = results(scene)
+    views.append(turned(views[0], 0.001))
+    auto.watch()
+    assert results(scene) == made
+    settle(monkeypatch)
+    assert len(results(scene)) == 1
+    views.append(turned(views[0], 0.5))
+    auto.watch()
+    assert not results(scene)
+    settle(monkeypatch)
+    assert len(results(scene)) == 1
+    assert looks == [True, False, True], "what is sharp must not become coarse for a little"
+    auto.schedule(scene)  # as where Blender tells of the results
+    settle(monkeypatch)
+    views.append(turned(views[0], 0.501))
+    auto.watch()
+    settle(monkeypatch)
+    assert looks == [True, False, True, False]
+
+
+def test_results_stay_where_nothing_would_stand_for_them(scene, monkeypatch):
+    views = [read_camera(scene, bpy.context.evaluated_depsgraph_get())]
+    monkeypatch.setattr(auto, "view_camera", lambda _: views[-1])
+    scene.tetflora.follow_viewport = scene.tetflora.auto_refine = True
+    auto.watch()
+    settle(monkeypatch)
+    made = results(scene)
+    scene.tetflora.preview.plants = 'NONE'
+    views.append(turned(views[0], 0.5))
+    auto.watch()
+    assert results(scene) == made
+    scene.tetflora.preview.plants = 'LIGHT'
+    views.append(turned(views[0], 0.6))
+    with auto.paused():  # Refine works with them
+        auto.watch()
+        assert results(scene) == made
+    views.append(turned(views[0], 0.7))
+    auto.watch()
+    assert not results(scene)

@@ -16,7 +16,7 @@ from tetflora_addon.compiled.sizes import Crown, CrownParts, crown_of
 from tetflora_addon.emission import budget
 from tetflora_addon.emission.budget import Stand, estimate, expanded_faces
 from tetflora_addon.emission.drawing import LIT_LEAVES, Parts, drawing, drawn_blocks
-from tetflora_addon.emission.plants import Transition
+from tetflora_addon.emission.plants import Block, Transition
 from tetflora_addon.jobs import run_to_end
 from tetflora_addon.proxies.facet_weights import facet_weights
 from tetflora_addon.refinement.loop import refine
@@ -135,7 +135,10 @@ def test_as_many_are_made(name, monkeypatch):
     how = Transition(flora, view, detail.leaf_limit, detail.tolerance), detail.facet, facet_weights(flora)
     made = 0
     for one in drawn_blocks(drawing(flora, detail.refinement, view, *how, detail.coarser)):
-        made += sum(len(facets) for facets, _ in one) if isinstance(one, Parts) else one.buffers.polygons
+        if isinstance(one, Parts):
+            made += sum(len(facets) for facets, _ in one)
+        elif isinstance(one, Block):
+            made += one.buffers.polygons
     assert 1 / 1.5 < _estimate(stand, camera).primitives / made < 1.5
 
 

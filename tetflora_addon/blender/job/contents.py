@@ -6,7 +6,7 @@ Meshes of assets are read here, one asset at a time; the engine compiles each in
 found by its digest.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Generator, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 from typing import Self
 
@@ -310,7 +310,6 @@ class SceneAssets:
     owners: tuple[bpy.types.Object | None, ...]
     owner: Integers32  # (n,): index into these
     originals: OriginalPolicy  # which are always drawn as the originals
-    warnings: tuple[str, ...] = field(default=())
 
     @property
     def faces(self) -> int:
@@ -340,13 +339,11 @@ def bind_steps(
     asset_warnings.clear()
     if not places:
         return None
-    targets = list(dict.fromkeys(one.target for one in places))
-    assets, warnings = [], []
+    targets, assets = list(dict.fromkeys(one.target for one in places)), []
     for number, target in enumerate(targets):
         progress = Progress(_START + (_END - _START) * number / len(targets), f'Reading "{target.name}"')
         yield progress
-        asset = yield from _compiled(scene, target, depsgraph, progress, warnings)
-        assets.append(asset)
+        assets.append((yield from _compiled(scene, target, depsgraph, progress)))
     index = {target: i for i, target in enumerate(targets)}
     owners = list(dict.fromkeys(_owner(one) for one in places))
     matrices = np.concatenate([one.matrices for one in places])
@@ -361,8 +358,7 @@ def bind_steps(
     owner = np.repeat([owners.index(_owner(one)) for one in places], number).astype(np.int32)
     _, costs = _costs(places, depsgraph, _covered(placed, camera))
     originals = costs.originals(_in_cycles(scene), left, always=scene.tetflora.asset_detail == 'AUTO')
-    asset_warnings.extend(dict.fromkeys(warnings))
-    return SceneAssets(tuple(targets), placed, matrices, tuple(owners), owner, originals, tuple(asset_warnings))
+    return SceneAssets(tuple(targets), placed, matrices, tuple(owners), owner, originals)
 
 
 def _owner(places: Places) -> bpy.types.Object | None:
@@ -398,33 +394,25 @@ def _covered(placed: PlacedAssets, camera: Camera) -> Floats:
     return np.bincount(placed.instances.asset, seen * pixels, len(placed.assets.every))
 
 
-def _compiled(
-    scene: bpy.types.Scene, target: Target, depsgraph: bpy.types.Depsgraph, progress: Progress, warnings: list[str]
-) -> Job[Asset]:
+def _compiled(scene: bpy.types.Scene, target: Target, depsgraph: bpy.types.Depsgraph, progress: Progress) -> Job[Asset]:
     """The compiled asset of a target, known already or made now."""
+    read: list[tuple[AssetSource, tuple[str, ...]]] = []
+
+    def reading() -> Generator[float, None, None]:
+        read.append((yield from read_source_steps(target, depsgraph)))
+
     hidden = bool(hidden_originals(scene))
-    source: AssetSource | None = None
     with originals_shown(scene, depsgraph):
-        digest = digest_of(target, depsgraph)
-        asset = asset_cache.find(digest)
-        if asset is None and hidden:
-            # While results hide what shows the asset, it is evaluated in here only.
-            source, told = run_to_end(read_source_steps(target, depsgraph))
-            warnings += told
+        asset = asset_cache.find(digest_of(target, depsgraph))
+        if asset is None and hidden:  # while results hide what shows the asset, it is evaluated in here only
+            run_to_end(reading())
     if asset is not None:
         return asset
-    if source is None:
-        steps = read_source_steps(target, depsgraph)
-        while True:
-            try:
-                done = next(steps)
-            except StopIteration as stop:
-                source, told = stop.value
-                warnings += told
-                break
-            yield Progress(progress.fraction, f'Reading "{target.name}": {done:.0%}')
-            depsgraph.update()  # reading what was deleted since the last step would crash Blender
-    fraction = progress.fraction
+    for done in () if read else reading():
+        yield Progress(progress.fraction, f'Reading "{target.name}": {done:.0%}')
+        depsgraph.update()  # reading what was deleted since the last step would crash Blender
+    (source, told), fraction = read[0], progress.fraction
+    asset_warnings.extend(text for text in told if text not in asset_warnings)
     compiling = mapped(compile_steps(source), lambda done: Progress(fraction, f'Compiling "{source.name}": {done:.0%}'))
     try:
         asset = yield from steps_in_thread(compiling, progress)

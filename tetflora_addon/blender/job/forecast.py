@@ -38,11 +38,10 @@ _GIGA, _MEGA = memory.GIGABYTE, 1e6
 
 @dataclass
 class _Counted:
-    """The stand of one view layer, and whether that has changed."""
+    """The stand of one view layer; of none where that has changed."""
 
     layer: tuple[str, str] | None = None
     stand: Stand | None = None
-    stale: bool = True
 
 
 _counted = _Counted()
@@ -58,8 +57,8 @@ def forecast(scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer) -> Estimat
     if depsgraph is None or scene.camera is None:
         return None
     layer = scene.session_uid, view_layer.name
-    if _counted.stand is None or _counted.layer != layer or _counted.stale:
-        _counted.stand, _counted.layer, _counted.stale = _count(scene, view_layer), layer, False
+    if _counted.stand is None or _counted.layer != layer:
+        _counted.stand, _counted.layer = _count(scene, view_layer), layer
     stand = _counted.stand
     if stand is None or not len(stand.number):
         return None
@@ -242,7 +241,7 @@ def stored(points: bpy.types.Mesh | bpy.types.PointCloud, name: str, chosen: Int
 
 
 def _on_change(*_: object) -> None:
-    _counted.stale = True
+    _counted.layer = None
 
 
 def _on_load(*_: object) -> None:

@@ -25,8 +25,8 @@ from ...camera.camera import Camera, origin_near
 from ...compiled.flora import Flora, compile_species
 from ...emission.asset_plan import AssetPlan, PlacedClusters
 from ...emission.budget import fit_to_budget
-from ...emission.drawing import drawing
-from ...emission.emitters import EmissionInput
+from ...emission.drawing import drawing, tiles_of
+from ...emission.emitters import Buffers, EmissionInput
 from ...emission.plants import Block, Transition, expanded_blocks
 from ...emission.polygons import PolygonBlock
 from ...jobs import Job, Progress, mapped
@@ -48,7 +48,7 @@ from ..results.instances import add_cluster, add_cluster_instances, add_instance
 from ..results.leaf_objects import leaf_objects, materials_of
 from ..results.meshes import AssetMeshes, cluster_mesh_steps, mesh_steps, read_mesh
 from ..results.output import adopt_materials, release_materials, result_collections
-from ..results.proxies import Baking, write_proxies
+from ..results.proxies import Baking, ProxyWriter, proxy_writer
 from ..results.proxy_kinds import ProxyKind, proxy_kind_of
 from ..runtime import JobData, guarded
 from ..scene.camera import read_camera
@@ -86,6 +86,8 @@ class _Run:
     clock: Stopwatch = field(default_factory=Stopwatch)
     form: ProxyKind | None = None
     baking: Baking | None = None
+    tiles: int = 0  # into which a first look and what replaces it are divided
+    whole: tuple[Camera, RefinementSettings] | None = None  # of what a first look stands for
 
 
 def left_alone(bound: contents.SceneAssets, plan: AssetPlan) -> Mask:
@@ -229,11 +231,27 @@ def read_meshes(target: Target, depsgraph: bpy.types.Depsgraph) -> AssetMeshes:
     return AssetMeshes(surfaces, np.array(numbers, np.int32), np.concatenate(matrices))
 
 
-def _write_blocks(run: _Run, blocks: Iterator[Block], start: float) -> Job[None]:
-    """Write blocks of plants; progress goes from a given fraction to .95, and the statistics count."""
-    materials: dict[tuple[int, str, int], list[bpy.types.Material]] = {}
+def _write_blocks(
+    run: _Run, blocks: Iterator[int | Block | Buffers], start: float, write_proxy: ProxyWriter | None = None
+) -> Job[None]:
+    """Write blocks of plants; progress goes from a given fraction to .95, and the statistics count.
 
-    def write(block: Block) -> Generator[None, None, Progress]:
+    The number of a tile comes before its blocks, and its proxies among them.
+    """
+    materials: dict[tuple[int, str, int], list[bpy.types.Material]] = {}
+    progress = Progress(start, "Making polygons")
+
+    def write(block: int | Block | Buffers) -> Generator[None, None, Progress]:
+        nonlocal progress
+        if isinstance(block, int):
+            run.results.begin(block)
+        elif isinstance(block, Block):
+            progress = yield from write_mesh(block)
+        else:
+            progress = replace((yield from write_proxy(block)), fraction=progress.fraction)
+        return progress
+
+    def write_mesh(block: Block) -> Generator[None, None, Progress]:
         species, what = run.flora.species[block.species], (block.species, block.kind, block.form)
         if what not in materials:
             if run.baking is not None and run.baking.leaves:
@@ -249,10 +267,11 @@ def _write_blocks(run: _Run, blocks: Iterator[Block], start: float) -> Job[None]
         text = f"Making polygons: {run.statistics.polygons_meshed:,}"
         return Progress(start + (0.95 - start) * block.fraction, text)
 
-    yield from written(_of_all_ages(run, blocks), write, Progress(start, "Making polygons"))
+    yield from written(_of_all_ages(run, blocks), write, progress)
+    run.results.begin(None)
 
 
-def _of_all_ages(run: _Run, blocks: Iterator[Block]) -> Iterator[Block]:
+def _of_all_ages(run: _Run, blocks: Iterator[int | Block | Buffers]) -> Iterator[int | Block | Buffers]:
     """Blocks of which those of one species, look and bark at several ages are one mesh: objects cost renderers time."""
     first: dict[tuple[str, str, str], int] = {}
     named = [(one.identifier, run.results.look_of(n), one.bark) for n, one in enumerate(run.flora.species)]
@@ -260,7 +279,10 @@ def _of_all_ages(run: _Run, blocks: Iterator[Block]) -> Iterator[Block]:
     if same == list(range(len(same))):
         yield from blocks
         return
-    for _, run_of in groupby(blocks, key=lambda block: block.number):
+    for of_plants, run_of in groupby(blocks, key=lambda block: isinstance(block, Block) and (block.number,)):
+        if not of_plants:
+            yield from run_of
+            continue
         parts: dict[tuple[int, str, int], list[Block]] = {}
         for block in run_of:
             parts.setdefault((same[block.species], block.kind, block.form), []).append(block)
@@ -395,15 +417,13 @@ def _refine_steps(run: _Run, first_look: bool) -> Job[Statistics]:
     for earlier in result_collections(scene, 'VIEW'):
         adopt_materials(scene, earlier)
     if first_look and refined and statistics.polygons_full > _MANY and not nobody_waits():
-        yield from _first_look(run)
+        results.first = yield from _first_look(run)
         clock.lap("first look")
     try:
+        in_main_thread(results.open)
         if not refined:
-            in_main_thread(results.open)
             yield from _write_blocks(run, expanded_blocks(flora, given.seeds, camera), 0.05)
-        elif plain and not given.others:
-            in_main_thread(results.open)  # instances alone, best left as they are
-        else:
+        elif given.others or not plain:  # instances alone may be best left as they are
             run.settings = contents.refinement_settings(scene)
             yield from _write_refined(run)
         if plain:
@@ -420,28 +440,31 @@ def _refine_steps(run: _Run, first_look: bool) -> Job[Statistics]:
     return statistics
 
 
-def _first_look(run: _Run) -> Job[None]:
+def _first_look(run: _Run) -> Job[Results]:
     """A coarse result in place of earlier ones, without baked light."""
     whole = run.results
     results = Results(whole.scene, whole.purpose, "", run.data)
     results.origin, results.owners, results.looks = whole.origin, whole.owners, whole.looks
     settings, camera = contents.refinement_settings(whole.scene).first_look(), run.camera.smaller(FIRST_LOOK)
     first = replace(run, results=results, given=replace(run.given, sources=None), settings=settings, camera=camera)
+    first.whole = run.camera, contents.refinement_settings(whole.scene)
     first.originals, first.statistics, first.clock = [*run.originals], Statistics(), Stopwatch()
     try:
+        in_main_thread(results.open)
         yield from mapped(_write_refined(first), lambda p: Progress(0.02 + 0.03 * p.fraction, "First look", p.waiting))
         run.data.check()
     except BaseException:
         in_main_thread(results.discard)
         raise
     in_main_thread(partial(_replace, first))
-    run.data.forget(results.collection)
+    run.tiles = first.tiles
+    return results
 
 
 def _replace(run: _Run) -> None:
     """Let new results take the place of earlier ones and of what they show."""
     results = run.results
-    remove_results(results.scene, results.purpose, keep=(results.collection, *run.beside))
+    remove_results(results.scene, results.purpose, keep=(results.shown, *run.beside))
     release_materials()
     hide_originals(results.scene, results.purpose, run.originals)
     results.finish()
@@ -516,20 +539,15 @@ def _refined(run: _Run, disc: float) -> Job[EmissionInput]:
         clusters = PlacedClusters(refinement.assets.placed, detail.camera, *how)
     # Light is baked for facets, whatever is made of them then.
     becomes = None if run.baking is not None else form.form(camera, disc, sun_of(refinement.lights))
-    with_all = drawing(
-        flora,
-        refinement,
-        detail.camera,
-        Transition(flora, detail.camera, detail.leaf_limit, detail.tolerance),
-        detail.facet,
-        facet_weights(flora),
-        detail.coarser,
-        given.occluders,
-        becomes,
-        detail.most,
-        run.settings.shadow_cutoff,
-        clusters,
-    )
+    view = detail.camera
+    seen = Transition(flora, view, detail.leaf_limit, detail.tolerance), detail.facet, facet_weights(flora)
+    unseen = detail.coarser, given.occluders, becomes, detail.most, run.settings.shadow_cutoff
+    with_all = drawing(flora, refinement, view, *seen, *unseen, clusters)
+    if run.whole is not None:  # as many as that is expected to have
+        pixels = run.whole[0].width * run.whole[0].height / (camera.width * camera.height)
+        run.tiles = tiles_of(fit_to_budget(refinement, *run.whole, times=pixels).camera)
+    if run.whole is not None or run.tiles == tiles_of(view):
+        with_all = replace(with_all, tiles=run.tiles)
     return EmissionInput(flora, refinement, camera, with_all, detail.tolerance, originals, disc)
 
 
@@ -543,17 +561,27 @@ def _write_refined(run: _Run) -> Job[None]:
         run.baking = Baking(given.sources, leaves=scene.tetflora.baked_light == 'ALL')
     work = _refined(run, drawn_disc(scene.render.engine))
     refined = yield from steps_in_thread(work, Progress(0.05, "Refining, pass 1"))
-    in_main_thread(run.results.open)
-    yield from _write_blocks(run, refined.mesh_blocks(), _LOOP_FRACTION)
+    emission, baking = run.form.emission, run.baking
+    baked = baking is not None and emission.baked_blocks is not None
+    write = proxy_writer(run.results, run.form, refined, run.statistics, baked)
+    by_tile = refined.drawing is not None and baking is None
+    run.results.by_tile = by_tile and refined.drawing.tiles > 0
+    blocks = refined.tiles(emission.blocks) if by_tile else refined.mesh_blocks()
+    yield from _write_blocks(run, blocks, _LOOP_FRACTION, write)
     if given.explicit is not None:
         yield from _write_polygons(run, refined.polygon_blocks())
     if run.bound is not None:
         yield from write_assets(run, refined.asset_plan())
-    if run.baking is not None:
+    if baking is not None:
         run.clock.lap("emit")
-        yield from _bake_light(run.baking, refined)
+        yield from _bake_light(baking, refined)
         run.clock.lap("light")
-    yield from write_proxies(run.results, run.form, refined, run.statistics, run.baking)
+    if not by_tile:
+        light = (baking.light, baking.first_facet) if baked else ()
+        proxies = (emission.baked_blocks if baked else emission.blocks)(refined, *light)
+        yield from written(proxies, write, Progress(0.95, "Making proxies"))
+    run.statistics.facet_pixels = float(refined.facet_pixels or 0.0)
+    run.statistics.facet_asked = scene.tetflora.facet if refined.facet_pixels else 0.0
 
 
 def _count(statistics: Statistics, refinement: Refinement) -> None:

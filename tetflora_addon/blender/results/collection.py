@@ -24,18 +24,16 @@ from .output import result_collections
 
 #: Bytes of a name in Blender 4.5 (5.0 takes more), less those of the number that it appends to equal names.
 _LONGEST = 59
-#: Custom property of collections under construction.
-UNFINISHED = "tetflora_unfinished"
 NAMES = {'VIEW': "TetFlora", 'RENDER': "TetFlora render"}
 
 _Made = TypeVar("_Made", bound=bpy.types.ID)
 
 
 class Results:
-    """A result collection under construction.
+    """A result collection under construction, which is in no scene until it is finished.
 
-    The artist's is linked to the scene at once, so that an object is seen as soon as it is made. That of a render is
-    filled and linked when it is finished: see `main_thread`. `discard` removes everything.
+    So nobody sees anything twice. A first look is finished, and what is made after it takes its place tile by tile.
+    `discard` removes all that has no place yet.
 
     Parameters
     ----------
@@ -50,6 +48,11 @@ class Results:
         self.scene = scene
         self.data = data
         self.purpose = purpose
+        self.first: Results | None = None  # the first look
+        self.by_tile = True  # whether that has the same tiles
+        self.tile: int | None = None  # of what is made now; what has none takes its place when all is made
+        #: Objects by their tiles, as long as they are not yet replaced
+        self.tiles: dict[int | None, list[bpy.types.Object]] = {}
         #: (3,): Where in the world positions in buffers are counted from, meters: objects are placed there
         self.origin: Sequence[float] = (0.0, 0.0, 0.0)
         #: Looks of objects that show instances, where more than they themselves say counts
@@ -69,14 +72,31 @@ class Results:
         name = earlier[0].name if earlier else NAMES[self.purpose] + self.mark  # the artist may have renamed it
         snow.fit_soils()
         self.collection = bpy.data.collections.new(name)
-        self._names.append((self.collection, name))
+        self._names += [(self.collection, name)] if self.first is None else []
         self.collection[output.PURPOSE] = self.purpose
-        self.collection[UNFINISHED] = True
         tag(self.collection)
         if self.data is not None:
             self.data.add("the result", self.collection)
-        if self.purpose == 'VIEW':
-            self.scene.collection.children.link(self.collection)
+        self.collection.is_runtime_data = True
+
+    @property
+    def shown(self) -> bpy.types.Collection:
+        """Where it takes its place."""
+        return self.collection if self.first is None else self.first.collection
+
+    def begin(self, tile: int | None) -> None:
+        """What follows is of a tile, or of none; the one before is complete."""
+        if self.first is not None and self.by_tile and self.tile is not None:
+            self._replace(self.tile)
+        self.tile = tile
+
+    def _replace(self, tile: int | None) -> None:
+        """Show what was made of a tile, in place of what the first look has of it."""
+        ways = (self.tiles, self.collection, self.shown), (self.first.tiles, self.shown, self.collection)
+        for tiles, before, after in ways:
+            for made in filter(is_there, tiles.pop(tile, ())):
+                after.objects.link(made)
+                before.objects.unlink(made)
 
     def add(
         self,
@@ -94,10 +114,12 @@ class Results:
         self.use(materials)
         name = self.name_for(name)
         if isinstance(buffers, PointBuffers):
-            return self._link(name, point_object(name, buffers, *materials), kind, species, look)
-        mesh = yield from mesh_steps(name, buffers, materials)
-        self._made.append(mesh)
-        return self._link(name, bpy.data.objects.new(name, mesh), kind, species, look)
+            made = point_object(name, buffers, *materials)
+        else:
+            mesh = yield from mesh_steps(name, buffers, materials)
+            self._made.append(mesh)
+            made = bpy.data.objects.new(name, mesh)
+        return self.add_object(name, made, kind, None, species, look)
 
     def name_for(self, name: str) -> str:
         """A name that ends in a number, with the mark; shortened so that Blender does not cut off the end."""
@@ -126,12 +148,17 @@ class Results:
 
     def shared(self, key: Hashable, make: Callable[[], _Made]) -> _Made:
         """What was made for a key, made only once for these results."""
-        if key not in self._shared:
-            self._shared[key] = make()
-        return self._shared[key]
+        return self._shared.get(key) or self._shared.setdefault(key, make())
 
     def add_object(
-        self, name: str, made: bpy.types.Object, kind: str, sources: Sequence[bpy.types.ID] = (), placed: bool = False
+        self,
+        name: str,
+        made: bpy.types.Object,
+        kind: str,
+        source: bpy.types.ID | None,
+        species: Species | None = None,
+        look: str = "",
+        placed: bool = False,
     ) -> bpy.types.Object:
         """Add an object that was made elsewhere, under a name by `name_for`.
 
@@ -139,25 +166,11 @@ class Results:
         ----------
         kind : str
             See `output.KIND`.
-        sources : sequence of bpy.types.ID
+        source : bpy.types.ID, optional
             What it shows instances of. If TetFlora made that, it goes with the last object that shows it.
         placed : bool
             It has a transform and data of its own, which stay; otherwise it counts from the origin.
         """
-        for source in sources:
-            if is_own(source):
-                made[output.SOURCE] = source
-        return self._link(name, made, kind, None, placed=placed)
-
-    def _link(
-        self,
-        name: str,
-        made: bpy.types.Object,
-        kind: str,
-        species: Species | None,
-        look: str = "",
-        placed: bool = False,
-    ) -> bpy.types.Object:
         own = [made] if placed else [made, made.data]
         self._made += own
         self._names += [(datablock, name) for datablock in own]
@@ -165,25 +178,28 @@ class Results:
             self.data.add("a part of the result", *own)
         if not placed:
             made.location = self.origin
-        made[output.KIND] = kind
-        if look:
-            made[LIKE] = look
+        shows = source if source is not None and is_own(source) else None
+        for key, value in ((output.KIND, kind), (LIKE, look), (output.SOURCE, shows)):
+            if value:
+                made[key] = value
         for datablock in own:
             tag(datablock)
+            datablock.is_runtime_data = True
         if self.purpose == 'VIEW':
-            self._show(made, species)
+            self._place(made, species)
         else:
             self._waiting.append((made, species))
         return made
 
-    def _show(self, made: bpy.types.Object, species: Species | None) -> None:
+    def _place(self, made: bpy.types.Object, species: Species | None) -> None:
         """Add an object to the collection, as the settings have it; Blender then lists all objects anew."""
         if species is not None:
-            made.parent = output.parent_of(self.collection, species.identifier, species.name)
+            made.parent = output.parent_of(self.shown, species.identifier, species.name)
             self._made.append(made.parent)
         made.hide_select = True  # artists select and edit plants, not millions of polygons
         output.dress(self.scene, made, "" if species is None else species.identifier)
         self.collection.objects.link(made)
+        self.tiles.setdefault(self.tile, []).append(made)
 
     def finish(self) -> None:
         """Everything is made and earlier results are gone, whose names these take.
@@ -191,9 +207,15 @@ class Results:
         The output settings decide about the artist's results; files never hold a render's.
         """
         for made, species in self._waiting:
-            self._show(made, species)
+            self._place(made, species)
         self._waiting.clear()
-        del self.collection[UNFINISHED]
+        if self.first is None:
+            self.scene.collection.children.link(self.collection)
+        else:
+            for tile in {**self.tiles, **self.first.tiles}:
+                self._replace(tile)
+            output.remove_collection(None, self.collection)
+            self.collection = self.first.collection
         for made, name in self._names:
             if made.name != name and is_own(made):
                 made.name = name
@@ -201,7 +223,6 @@ class Results:
         if self.purpose == 'VIEW':
             output.dress_collection(self.scene, self.collection)
         else:
-            self.scene.collection.children.link(self.collection)
             output.mark_runtime(self.collection, True)
         output.remove_unused(self._held)  # that nothing shows
 
@@ -236,8 +257,7 @@ def leave_out_of_file() -> None:
     for scene in bpy.data.scenes:
         saved = scene.tetflora.output.save_results
         for collection in result_collections(scene) if scene.library is None else ():
-            # While refinement runs, the file gets the earlier results.
-            runtime = collection[output.PURPOSE] == 'RENDER' or not saved or UNFINISHED in collection
+            runtime = collection[output.PURPOSE] == 'RENDER' or not saved
             output.mark_runtime(collection, runtime)
             if runtime and collection[output.PURPOSE] == 'VIEW':
                 output.keep_materials(collection)

@@ -73,7 +73,7 @@ def add_instances(
     name = results.name_for(name)
     made = _instancer(name, source, matrices, ids)
     look_like(made, like, results.owners.get(like))
-    return results.add_object(name, made, KIND_WHOLE, [source])
+    return results.add_object(name, made, KIND_WHOLE, source)
 
 
 def add_cluster_instances(
@@ -107,7 +107,7 @@ def add_cluster_instances(
     name = results.name_for(name)
     made = _instancer(name, collection, matrices, ids, place[pick])
     look_like(made, like, results.owners.get(like))
-    return results.add_object(name, made, KIND_CLUSTERS, [collection])
+    return results.add_object(name, made, KIND_CLUSTERS, collection)
 
 
 def add_cluster(
@@ -296,7 +296,7 @@ def add_stand_in(
             # Not at the end: adaptive subdivision has to be the last one.
             made.modifiers.move(len(made.modifiers) - 1, nodes[-1] + 1)
     look_like(made, original, results.owners.get(original))
-    return results.add_object(name, made, STAND_IN, placed=True)
+    return results.add_object(name, made, STAND_IN, None, placed=True)
 
 
 def shows_itself(original: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> bool:
@@ -307,14 +307,9 @@ def shows_itself(original: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> 
     geometry = geometry_of(original, depsgraph)
     if geometry is None:
         return len(getattr(original.data, "polygons", ())) > 0
-    mesh, curves, points = (getattr(geometry, kind) for kind in ("mesh", "curves", "pointcloud"))
-    return (
-        (mesh is not None and len(mesh.polygons) > 0)
-        or (curves is not None and len(curves.curves) > 0)
-        or (points is not None and len(points.points) > 0)
-        or geometry.volume is not None
-        or any(_is_hair(system) for system in original.particle_systems)
-    )
+    kinds = (("mesh", "polygons"), ("curves", "curves"), ("pointcloud", "points"))
+    shown = any(len(getattr(getattr(geometry, kind), items, ())) for kind, items in kinds)
+    return shown or geometry.volume is not None or any(_is_hair(system) for system in original.particle_systems)
 
 
 def _is_hair(system: bpy.types.ParticleSystem) -> bool:

@@ -22,7 +22,7 @@ from ..materials.materials import bark_material, leaf_material
 from ..materials.nodes import is_ours
 from ..scene.skeletons import read_skeleton, skeleton_object_of
 from ..species.edits import species_for
-from .meshes import UV_MAP, read_mesh_arrays
+from .meshes import read_mesh
 from .output import replaced_material
 
 #: Transmission under which leaves are needles, scales or succulent.
@@ -142,7 +142,6 @@ def _length(species: Species, kind: str) -> float:
     return float(np.mean(sizes)) if sizes else 0.1
 
 
-_INDEX = "material_index"
 _COLORED = "tetflora_colored"  # on materials whose viewport color is set; another is the artist's choice
 
 
@@ -193,19 +192,17 @@ def _model_of(species: Species, source: bpy.types.Object, depsgraph: bpy.types.D
     if source.type != 'MESH':
         raise SpeciesError(f'"{source.name}", the {kind} of "{species.name}", is not a mesh object; choose a mesh')
     with mesh_of(source.evaluated_get(depsgraph)) as mesh:
-        arrays = read_mesh_arrays(mesh)
-    if arrays.polygons == 0:
+        arrays = read_mesh(mesh, [slot.material for slot in source.material_slots] or [None])
+    if len(arrays.slots) == 0:
         raise SpeciesError(
             f'"{source.name}", the {kind} of "{species.name}", has no faces; add faces or choose another mesh'
         )
     offsets, corners = arrays.face_offsets, arrays.corner_verts
     faces = [corners[a:b].tolist() for a, b in pairwise(offsets)]
     model = leaf_model(arrays.positions, faces)
-    if UV_MAP in arrays.attributes:
-        model = replace(model, uv=arrays.attributes[UV_MAP][1], textured=True)
-    if len(source.material_slots) > 1 and _INDEX in arrays.attributes:
-        model = replace(model, material_index=arrays.attributes[_INDEX][1])
-    return model
+    if uv_map := arrays.rendered[0]:
+        model = replace(model, uv=arrays.layers[uv_map].values, textured=True)
+    return replace(model, material_index=arrays.slots) if arrays.slots.any() else model
 
 
 def materials_of(scene: bpy.types.Scene, species: Species, kind: str, form: int) -> list[bpy.types.Material]:

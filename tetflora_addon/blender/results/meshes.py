@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Meshes and point clouds from buffers, and buffers from meshes, at the speed of a copy.
+"""Meshes and point clouds from buffers, and arrays from meshes, at the speed of a copy.
 
 Where Python cannot resize point clouds, geometry nodes make them from the vertices of a mesh.
 
@@ -149,34 +149,6 @@ def check_buffers(buffers: MeshBuffers) -> None:
 def _check_range(key: str, indices: NDArray, count: int) -> None:
     if indices.size and (indices.min() < 0 or indices.max() >= count):
         raise ValueError(f"{key} must lie between 0 and {count - 1}, not {indices.min()} to {indices.max()}")
-
-
-def read_mesh_arrays(mesh: bpy.types.Mesh) -> MeshBuffers:
-    """Copy a mesh into buffers: the geometry, the active UV map and the indices of materials if there are any.
-
-    Parameters
-    ----------
-    mesh : bpy.types.Mesh
-        Of an object or evaluated. In Edit Mode, call ``obj.update_from_editmode()`` first. Positions stay in the mesh's
-        own space.
-
-    Returns
-    -------
-    MeshBuffers
-        Copies; ``attributes`` may have ``UVMap`` and ``material_index``; ``smooth`` if any face is.
-    """
-    positions = members(mesh.vertices, "co", 3)
-    edges = members(mesh.edges, "vertices", 2, np.int32)
-    corner_verts = members(mesh.loops, "vertex_index", dtype=np.int32)
-    corner_edges = members(mesh.loops, "edge_index", dtype=np.int32)
-    smooth = members(mesh.polygons, "use_smooth", dtype=bool)
-    attributes = {}
-    layer = mesh.uv_layers.active
-    if layer is not None and len(mesh.loops):
-        attributes[UV_MAP] = ("CORNER", members(layer.uv, "vector", 2))
-    if "material_index" in mesh.attributes:
-        attributes["material_index"] = ("FACE", members(mesh.polygons, "material_index", dtype=np.int32))
-    return MeshBuffers(positions, edges, corner_verts, corner_edges, face_offsets(mesh), attributes, bool(smooth.any()))
 
 
 def point_object(name: str, buffers: PointBuffers, material: bpy.types.Material) -> bpy.types.Object:

@@ -88,6 +88,7 @@ def parent_of(collection: bpy.types.Collection, identifier: str, name: str) -> b
         found.hide_select = True
         found[KIND], found[SPECIES] = PARENT, identifier
         tag(found)
+        found.is_runtime_data = True
     if found.name not in collection.objects:
         collection.objects.link(found)
     return found

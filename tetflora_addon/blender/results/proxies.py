@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Proxies of a refinement as objects, in the scene's form, and baked light of proxies and meshes."""
 
-from collections.abc import Generator, Iterator, Mapping
+from collections.abc import Callable, Generator, Iterator, Mapping
 from itertools import count
 
 import bpy
@@ -12,12 +12,12 @@ from ...arrays import Floats32, Integers32
 from ...buffers import MeshBuffers, PointBuffers
 from ...emission.asset_plan import ASSETS
 from ...emission.emitters import Buffers, EmissionInput
-from ...jobs import Job, Progress
+from ...jobs import Progress
 from ...light.illumination import BATCH, BakedLight, SheetList, Sources, at_vertices, baked_attributes, baked_light
 from ...refinement.loop import Statistics
 from ..attributes import face_offsets, read, write
 from ..materials.nodes import find_socket, is_ours
-from ..worker import calling, in_thread, written
+from ..worker import calling, in_thread
 from .collection import Results
 from .output import KIND
 from .proxy_kinds import ProxyKind, proxy_kind_of
@@ -99,28 +99,16 @@ def _light_of_mesh(
     return baked_attributes('POINT' if rounded else 'FACE', front, back)
 
 
-def write_proxies(
-    results: Results, form: ProxyKind, refined: EmissionInput, statistics: Statistics, baking: Baking | None = None
-) -> Job[None]:
-    """Make the proxies of a refined scene; a thread makes the next block while one is written.
+ProxyWriter = Callable[[Buffers], Generator[None, None, Progress]]
 
-    Parameters
-    ----------
-    statistics : Statistics
-        Gets the number of faces or points, and their memory.
-    baking : Baking, optional
-        With the light of proxies. Their facets must have been added last.
 
-    Yields
-    ------
-    Progress
-        From .95 on.
+def proxy_writer(
+    results: Results, form: ProxyKind, refined: EmissionInput, statistics: Statistics, baked: bool = False
+) -> ProxyWriter:
+    """What makes objects of the buffers of proxies; the statistics get the number of faces or points, and their memory.
+
+    They are numbered by their tiles, or where there are none one after the other.
     """
-    emission = form.emission
-    baked = baking is not None and emission.baked_blocks is not None
-    blocks = emission.baked_blocks(refined, baking.light, baking.first_facet) if baked else emission.blocks(refined)
-    statistics.facet_pixels = float(refined.facet_pixels or 0.0)
-    statistics.facet_asked = results.scene.tetflora.facet if refined.facet_pixels else 0.0
     numbers = count()
 
     def write(buffers: Buffers) -> Generator[None, None, Progress]:
@@ -135,14 +123,14 @@ def write_proxies(
             )
             material = kinds[isinstance(buffers, PointBuffers)]()
             set_sockets(material, results.scene, form.sockets)
-        name = f"{'TetFlora' if species is None else species.name} proxies {number:03d}"
+        own = number if results.tile is None else results.tile
+        name = f"{'TetFlora' if species is None else species.name} proxies {own:03d}"
         yield from results.add(name, "proxy", buffers, [material], species, look)
         statistics.polygons_proxy += buffers.polygons
         statistics.memory_mb += buffers.nbytes / 1e6
         return Progress(1.0 - 0.05 * 0.9**number, f"Making proxies: {statistics.polygons_proxy:,}")
 
-    yield (progress := Progress(0.95, "Making proxies"))
-    yield from written(blocks, write, progress)
+    return write
 
 
 def set_sockets(material: bpy.types.Material, scene: bpy.types.Scene, sockets: Mapping[str, str]) -> None:

@@ -251,7 +251,8 @@ def timeline_moves() -> bool:
     return any(screen.is_animation_playing or screen.is_scrubbing for screen in screens)
 
 
-def _viewports(scene: bpy.types.Scene) -> list[tuple[bpy.types.SpaceView3D, bpy.types.Area]]:
+def viewports(scene: bpy.types.Scene) -> list[tuple[bpy.types.SpaceView3D, bpy.types.Area]]:
+    """Viewports that show a scene, in all windows."""
     manager = bpy.context.window_manager
     windows = [window for window in ([] if manager is None else manager.windows) if window.scene == scene]
     areas = [area for window in windows for area in window.screen.areas if area.type == 'VIEW_3D']
@@ -260,13 +261,13 @@ def _viewports(scene: bpy.types.Scene) -> list[tuple[bpy.types.SpaceView3D, bpy.
 
 def views_of(scene: bpy.types.Scene) -> list[Floats]:
     """Matrices (4, 4) from the world to clip space of all viewports that show a scene, as they were last drawn."""
-    views = [view for space, _ in _viewports(scene) for view in (space.region_quadviews or [space.region_3d])]
+    views = [view for space, _ in viewports(scene) for view in (space.region_quadviews or [space.region_3d])]
     return [np.array(view.perspective_matrix, np.float64) for view in views]
 
 
 def is_rendered(scene: bpy.types.Scene) -> bool:
     """Whether a viewport shows a scene in *Rendered* shading."""
-    return any(space.shading.type == 'RENDERED' for space, _ in _viewports(scene))
+    return any(space.shading.type == 'RENDERED' for space, _ in viewports(scene))
 
 
 def viewport_of(scene: bpy.types.Scene) -> tuple[bpy.types.SpaceView3D, bpy.types.Region] | None:
@@ -275,7 +276,7 @@ def viewport_of(scene: bpy.types.Scene) -> tuple[bpy.types.SpaceView3D, bpy.type
     None where that one looks through the camera, or where there is no window.
     """
     found = []
-    for space, area in _viewports(scene):
+    for space, area in viewports(scene):
         region = next((r for r in area.regions if r.type == 'WINDOW'), None)
         if region is not None and min(region.width, region.height) > 1:
             own = space.region_3d.view_perspective != 'CAMERA'

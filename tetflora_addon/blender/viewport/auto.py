@@ -7,6 +7,9 @@ refinement depends on is the same as last time, nothing is done. Earlier results
 through undo. Undo, loading, rendering, and operators that change results stop the work too, because it holds datablocks
 that they remove. Blender tells nobody when a viewport is turned or shaded otherwise, so it is looked at: while one
 shows plants in *Rendered* shading it is on by itself, for that view, unless the artist switches it off there.
+
+What was not seen is coarse, which shows from another side. So results go as soon as the view is no longer `alike`, and
+simple shapes stand for them until there is a first look; else they stay until all is sharp, without a first look.
 """
 
 import time
@@ -14,9 +17,13 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from hashlib import blake2b
+from math import cos, radians
 
 import bpy
+import numpy as np
 
+from ...arrays import unit
+from ...camera.camera import Camera
 from ...errors import TetFloraError
 from ...jobs import Job, Pace
 from ...refinement.loop import Statistics
@@ -27,10 +34,11 @@ from ..materials.nodes import is_ours, is_own
 from ..placing.plant_objects import prepare_scene
 from ..properties import auto_refine_switched
 from ..results.collection import has_results
+from ..results.hiding import remove_results
 from ..results.leaf_objects import leaf_objects
 from ..results.output import PURPOSE, remove_collection, result_collections
 from ..runtime import GoneError, Handlers, Part, call_off, call_soon, in_order, listening, redraw, with_uid
-from ..scene.camera import is_rendered, view_camera
+from ..scene.camera import is_rendered, view_camera, viewport_of, viewports
 from ..scene.fields import stand_years
 from ..settings import season_of, wind_of, years_of
 from .state import camera_now, find
@@ -39,7 +47,9 @@ from .state import camera_now, find
 QUIET, SLICE = 0.6, 0.02
 _MADE_FOR = "tetflora_made_for"  # on result collections, see `results_made_for`
 _BUSY = 0.5  # seconds until it looks again whether Blender has time
-_LOOK = 0.2  # seconds between two looks at the viewport
+_LOOK = 0.1  # seconds between two looks at the viewport
+#: How much farther than its image a view may show what results were made for, in parts of its width, and from where.
+_BEYOND, _TURNED = 0.04, radians(2.0)
 _CHANGING = (bpy.types.Object, bpy.types.Camera, bpy.types.Light, bpy.types.Mesh, bpy.types.PointCloud, bpy.types.Curve)
 
 
@@ -58,13 +68,16 @@ class _State:
     waiting: bool = False  # for a thread that computes
     again: bool = False  # look once more when the job is done
     paused: int = 0  # others that refine
-    view: str = ""  # of the viewport when it was looked at last
+    view: tuple[int, str] = (0, "")  # a scene, and that of the viewport when it was looked at last
+    camera: Camera | None = None  # of the job
     ours: set[int] = field(default_factory=set)  # scenes where Rendered shading has switched it on
     refused: set[int] = field(default_factory=set)  # where the artist does not want it there
 
 
 _state = _State()
 _done: dict[int, str] = {}  # digest of the results that a scene has, by its `session_uid`
+_seen: dict[int, Camera | None] = {}  # the view that these are for
+_sharp: set[int] = set()  # scenes of which at most the view has changed since all was refined
 
 
 def message() -> str:
@@ -83,7 +96,7 @@ def _switched(scene: bpy.types.Scene) -> None:
 
 def _begin_anew(scene: bpy.types.Scene) -> None:
     stop()
-    _state.message = _state.view = ""
+    _state.message, _state.view = "", (0, "")
     if scene.tetflora.auto_refine:
         schedule(scene)
         watch()
@@ -99,10 +112,13 @@ def watch() -> float | None:
     if scene is not None:
         _follow_shading(scene)
     follows = scene is not None and scene.tetflora.auto_refine and _follows_viewport(scene)
-    if follows and (view := repr(view_camera(scene))) != _state.view:
-        before, _state.view = _state.view, view
+    now = view_camera(scene) if follows else None
+    if follows and (view := (scene.session_uid, repr(now or camera_now(scene)))) != _state.view:
+        (other, before), _state.view = _state.view, view
         if before:
-            schedule(scene)
+            schedule(scene, by_view=True)
+        if before and other == scene.session_uid and not (_is_busy() or _still_good(scene, now)):
+            remove_results(scene, 'VIEW')
     if not bpy.app.background:
         call_soon(watch, _LOOK)
     return _LOOK if follows or not bpy.app.background else None
@@ -122,9 +138,39 @@ def _follow_shading(scene: bpy.types.Scene) -> None:
         redraw()
 
 
-def schedule(scene: bpy.types.Scene) -> None:
+def alike(before: Camera | None, now: Camera | None, away: float) -> bool:
+    """Whether results for one view do for another, until there are new ones.
+
+    All that it shows so many meters away is in their image then, and it is seen from nearly the same side.
+    """
+    if before is None or now is None or not before.kind == now.kind == "PERSP":
+        return False
+    rim = np.array([(x, y, -1.0) for x in now.window[:2] for y in now.window[2:]]) * away
+    points = now.position + rim @ now.frame.T
+    then, now_along = unit(points.mean(axis=0) - np.stack([before.position, now.position]))
+    inside = before.widened(_BEYOND).distance_to_view(points).max() <= 0.0
+    return bool(inside and then @ now_along > cos(_TURNED))
+
+
+def _still_good(scene: bpy.types.Scene, now: Camera | None) -> bool:
+    """Whether results are better than simple shapes, or these would not be seen."""
+    rendered = [space for space, _ in viewports(scene) if space.shading.type == 'RENDERED']
+    if scene.tetflora.preview.plants == 'NONE' or not all(space.overlay.show_overlays for space in rendered):
+        return True
+    return alike(_seen.get(scene.session_uid), now, _away(scene))
+
+
+def _away(scene: bpy.types.Scene) -> float:
+    """Meters to what a viewport turns around."""
+    found = viewport_of(scene)
+    return found[0].region_3d.view_distance if found else 1.0
+
+
+def schedule(scene: bpy.types.Scene, by_view: bool = False) -> None:
     """Refine a scene when it has been quiet for a moment; stops what was begun before."""
     stop()
+    if not by_view:
+        _sharp.discard(scene.session_uid)
     _state.scene, _state.due = scene.session_uid, time.monotonic() + QUIET
     if not bpy.app.background:
         call_soon(tick, QUIET)
@@ -159,6 +205,11 @@ def refined(scene: bpy.types.Scene) -> None:
         _done[scene.session_uid] = scene_digest(scene, layer.depsgraph)  # for the scene's camera
 
 
+def _is_busy() -> bool:
+    """Whether others work with results, or the artist with something else."""
+    return _state.paused > 0 or bpy.app.is_job_running('RENDER') or bpy.context.mode != 'OBJECT'
+
+
 def tick() -> float | None:
     """Do a slice of what there is to do; seconds until the next, or None if nothing is left."""
     scene = with_uid(bpy.data.scenes, _state.scene)
@@ -168,7 +219,7 @@ def tick() -> float | None:
     wait = _state.due - time.monotonic()
     if _state.steps is None and wait > 0.0:
         return wait
-    if _state.paused or bpy.app.is_job_running('RENDER') or bpy.context.mode != 'OBJECT':
+    if _is_busy():
         return _BUSY
     _state.working = True
     try:
@@ -195,12 +246,19 @@ def _begin(scene: bpy.types.Scene) -> bool:
     camera = view_camera(scene) if _follows_viewport(scene) else None
     digest = scene_digest(scene, layer.depsgraph, camera)
     if _done.get(scene.session_uid) == digest and has_results(scene):
+        _sharp.add(scene.session_uid)
         _state.message = ""
         redraw()
         return False
     _state.digest, _state.again, _state.waiting = digest, False, False
     _state.made_for, _state.pace = results_made_for(scene), Pace(SLICE, SLICE)
-    _state.steps = refine.refine_steps(scene, layer.depsgraph, camera=camera, first_look=True)
+    seen = scene.session_uid in _sharp and has_results(scene)
+    coarse = not (seen and alike(_seen.get(scene.session_uid), camera, _away(scene)))
+    _state.steps = refine.refine_steps(scene, layer.depsgraph, camera=camera, first_look=coarse)
+    _state.camera = camera
+    if coarse:
+        _seen[scene.session_uid] = camera
+        _sharp.discard(scene.session_uid)
     return True
 
 
@@ -212,7 +270,8 @@ def _slice(scene: bpy.types.Scene) -> bool:
             progress = next(_state.steps)
     except StopIteration as stop:
         _state.steps, _state.message = None, stop.value.unknown
-        _done[scene.session_uid] = _state.digest
+        _done[scene.session_uid], _seen[scene.session_uid] = _state.digest, _state.camera
+        _sharp.add(scene.session_uid)
         note_results(scene, _state.made_for)
         prepare_scene(scene)
         redraw()
@@ -256,7 +315,7 @@ def changed_since(scene: bpy.types.Scene) -> list[str]:
     return [name for name, text in results_made_for(scene).items() if before.get(name, text) != text] if before else []
 
 
-_seen: dict[int, str] = {}  # settings of scenes as they were at the last change
+_known: dict[int, str] = {}  # settings of scenes as they were at the last change
 
 
 def on_change(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
@@ -264,8 +323,8 @@ def on_change(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
     if _state.working or not scene.tetflora.auto_refine:
         return
     settings = f"{choices(scene)}{camera_now(scene)}{leaf_objects(scene)}"
-    other = _seen.get(scene.session_uid) != settings
-    _seen[scene.session_uid] = settings
+    other = _known.get(scene.session_uid) != settings
+    _known[scene.session_uid] = settings
     changed = [one for one in depsgraph.updates if isinstance(one.id.original, _CHANGING)]
     concerns = [one for one in changed if not is_ours(one.id.original)]
     at_it = _state.steps is not None and scene.session_uid == _state.scene
@@ -323,9 +382,9 @@ def after_undo(*_arguments: object) -> None:
 def on_load(*_arguments: object) -> None:
     """Another file: its results are none of ours."""
     stop()
-    _done.clear()
-    _seen.clear()
-    _state.message = _state.view = ""
+    for of_scenes in (_done, _seen, _known, _sharp):
+        of_scenes.clear()
+    _state.message, _state.view = "", (0, "")
     _state.ours.clear()
     _state.refused.clear()
     call_off(tick)

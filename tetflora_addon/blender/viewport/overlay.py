@@ -25,7 +25,7 @@ from ...preview.levels import FORMS, THICK, Level, Levels, as_shown, colors_of, 
 from ...preview.light_plants import CrownPoints, Shapes, nearest
 from ...refinement.decisions import Decision
 from ...tetrahedra.geometry import EDGES
-from ..results.collection import UNFINISHED, result_collections
+from ..results.collection import result_collections
 from . import state
 from .state import Preview, TetFloraPreview
 
@@ -381,7 +381,7 @@ def _guarded(draw: Callable[[bpy.types.Context, Preview], None]) -> None:
 
 def _in_space(context: bpy.types.Context, preview: Preview) -> None:
     # Simple plants stand in place of refined ones, where viewports show none.
-    done = [c for c in result_collections(context.scene, 'VIEW') if UNFINISHED not in c]
+    done = result_collections(context.scene, 'VIEW')
     seen = (obj.visible_get(view_layer=context.view_layer) for collection in done for obj in collection.objects)
     if preview.shapes is not None and not any(seen):
         _draw_plants(preview)

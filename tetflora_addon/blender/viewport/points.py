@@ -98,18 +98,14 @@ def dots_of(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> Dots:
 def status(population: bpy.types.PropertyGroup) -> str:
     """How many plants there are or will be, and as what; reads no geometry, so that panels may call it."""
     dots = _state.dots if switch.scene is not None and population.uid == _state.uid else None
-    if dots is not None:
-        number, known = dots.plants, not dots.more or population.by_density
-    elif population.uid and not awaits_update(population):
-        number, known = population.made, True
+    if dots is not None and (population.by_density or not dots.more):
+        number = dots.plants
+    elif dots is None and population.uid and not awaits_update(population):
+        number = population.made
     elif population.by_density:
-        number, known = 0, False
-    else:
-        number, known = population.count, True
-    if dots is not None and dots.more and not population.by_density:
-        number, known = population.count, True
-    if not known:
         return "As many plants as fit"
+    else:
+        number = population.count
     made_as = "one field" if makes_field(population, number) else "empties"
     more = "more than " if dots is not None and dots.more and population.by_density else ""
     return f"{more}{number:,} plant{'' if number == 1 else 's'}, as {made_as}"
