@@ -16,7 +16,7 @@ pytestmark = pytest.mark.usefixtures("clean_file")
 
 @pytest.fixture
 def scene(monkeypatch):
-    """A far tree on the left, a near one on the right and one beside the image, which is drawn in three tiles; the middle is empty."""
+    """A far tree on the left, a near one on the right and one beside the image, whose middle tile of three is empty."""
     monkeypatch.setattr(refine, "_MANY", 1)
     add_camera(location=(0.0, 0.0, 3.0))
     for seed, (x, y) in enumerate(((-14.0, 60.0), (5.0, 25.0), (40.0, 25.0))):

@@ -103,20 +103,23 @@ def test_what_is_hidden_never_shows() -> None:
 
 @pytest.mark.parametrize("lens", [0.0, 0.1, 0.4])
 def test_no_facet_of_what_is_outside_is_in_the_image(lens: float) -> None:
-    """A plant of which a little is in the corner of the image: what is large lies beyond it and its blur as a whole."""
+    """A plant of which a little is in the corner of the image: what is large lies beyond it and its blur as a whole.
+
+    Or behind full pixels.
+    """
     flora = support.alone("birch", BIRCH)
     seeds = support.plants([3], position=[(11.2, 0, 0)])
     camera = support.camera((0, -30, 8), (0, 0, 8), pixels=WIDTH, view=0.7)
     camera = replace(camera, lens_radius=lens, focus=10.0)
-    _, facets, seen = support.drawn(flora, run(flora, seeds, camera)[1], camera, 1.2, 0.6)
-    cover = Coverage(camera)
-    inside = ~cover.outside(cover.of_corners(triangle_corners(facets))[0])
+    blocks, facets, seen = support.drawn(flora, run(flora, seeds, camera)[1], camera, 1.2, 0.6)
+    cover = coverage_of(blocks, facets, seen, camera)
+    prints = cover.of_corners(triangle_corners(facets))[0]
+    inside = ~cover.outside(prints)
     assert inside.any() and (~seen).any()
-    assert pixels_of(facets, camera)[inside & ~seen].max(initial=0.0) < 6.0
-    assert (inside & ~seen & (pixels_of(facets, camera) > 1.5)).sum() < 0.02 * inside.sum()
+    assert pixels_of(facets, camera)[inside & ~seen & ~cover.hidden(prints)].max(initial=0.0) < 1.5
 
 
-@pytest.mark.parametrize(("most", "lost"), [(np.inf, 1e-6), (2e5, 0.15)])
+@pytest.mark.parametrize(("most", "lost"), [(np.inf, 1e-6), (2.5e5, 0.15)])
 def test_what_stands_far_behind_the_eye_is_no_larger_than_a_crown(most: float, lost: float) -> None:
     """No facet out of view is a roof over what is seen; all keep their area together, as far as there is room."""
     flora, behind = support.alone("birch", BIRCH), support.grove(200, 8.0)
@@ -170,7 +173,7 @@ def test_primitives_follow_the_image_however_deep_the_wood_is() -> None:
         every = support.plants(np.arange(len(place)), position=place)
         blocks, facets, _ = support.drawn(flora, run(flora, every, camera)[1], camera, 1.2, 0.6)
         numbers.append(sum(b.buffers.polygons for b in blocks) + len(facets))
-    assert numbers[1] < 1.4 * numbers[0]
+    assert numbers[1] < 1.5 * numbers[0]
     assert numbers[0] < 9.0 * camera.width * camera.height
 
 
