@@ -70,19 +70,19 @@ def shell_buffers(cells: MediumCells, rank: NDArray | None = None, light: Floats
     cells = replace(cells, matrices=np.where(flat[:, None], 0.0, cells.matrices))
     gradients = np.where(flat[:, None, None], 0.0, cells.gradients)
     of_cells = {
-        "color": cells.color,
-        "transmission": cells.transmission,
-        "kappa": cells.mean_extinction,
-        "s0": cells.matrices[:, :3],
-        "s1": cells.matrices[:, 3:],
-        "normal": cells.normal,
-        "plane": cells.plane,
-        "random": _cell_noise(cells.vertices),
-        **{f"g{k}": gradients[:, k] for k in (1, 2, 3)},
+        "tf_color": cells.color,
+        "tf_transmission": cells.transmission,
+        "tf_kappa": cells.mean_extinction,
+        "tf_s0": cells.matrices[:, :3],
+        "tf_s1": cells.matrices[:, 3:],
+        "tf_normal": cells.normal,
+        "tf_plane": cells.plane,
+        "tf_random": _cell_noise(cells.vertices),
+        **dict(zip(("tf_g1", "tf_g2", "tf_g3"), gradients[:, 1:].swapaxes(0, 1), strict=True)),
     }
     if light is not None:
-        of_cells |= {f"light{k}": light[order, k] for k in range(4)}
-    faces = {f"tf_{k}": ("FACE", np.repeat(own.astype(np.float32), 4, axis=0)) for k, own in of_cells.items()}
+        of_cells |= {f"tf_light{k}": light[order, k] for k in range(4)}
+    faces = {name: ("FACE", np.repeat(own.astype(np.float32), 4, axis=0)) for name, own in of_cells.items()}
     first = np.arange(len(cells), dtype=np.int32)[:, None, None]
     return MeshBuffers(
         positions=cells.vertices.reshape(-1, 3).astype(np.float32),
