@@ -55,8 +55,7 @@ def steps(ui):
     while not quiet(scene):
         if polygons(scene) != parts[-1]:
             parts.append(polygons(scene))
-            yield from ui.picture(f"part_{len(parts)}")
-        yield 0.1
+        yield 0.01
     ui.values["near"] = polygons(scene)
     parts.append(ui.values["near"])
     yield from ui.picture("near")
@@ -72,7 +71,7 @@ def steps(ui):
         yield 0.1
     ui.values["least_meanwhile"] = min(looks)
     look(space, 70.0, 400.0)
-    yield 0.4
+    yield from ui.until(lambda: polygons(scene) == 0 or bool(auto.message()), 10, "what is out of date is hidden")
     ui.values["moving"] = polygons(scene)
     yield from ui.picture("moving")
     yield from ui.until(lambda: quiet(scene), 120, "far")
