@@ -42,15 +42,14 @@ def test_a_new_population_stands_as_its_species_need_it():
     settings = bpy.context.scene.tetflora.populate
     assert settings.distance_by_species
     _choose(settings, "birch")
-    assert 2.5 <= distances.distance_of(settings) <= 3.5
+    assert 3.0 <= distances.distance_of(settings) <= 4.0
     _choose(settings, "grass")
     assert distances.distance_of(settings) < 0.4
     _ground()
     population = _populate(species="birch", count=100)
     assert population.distance_by_species
-    distance = distances.distance_of(population)
-    assert 2.5 <= distance == rules.rules_from(population)[0].min_distance <= 3.5
-    assert distance <= _least_gap() < 1.2 * distance
+    assert 3.0 <= distances.distance_of(population) == rules.rules_from(population)[0].min_distance <= 4.0
+    assert 3.0 <= _least_gap() < 3.6
     before = distances.distance_of(population)
     _choose(population, "oak")
     assert rules.is_outdated(population)
@@ -118,7 +117,7 @@ def test_the_brush_follows_what_it_paints():
     painted.density = 0.5
     painted.source, painted.species = 'ONE', "birch"
     birch = brush.brush_of(scene)[0].min_distance
-    assert birch > 2.5
+    assert birch > 3.0
     painted.species = "grass"
     assert brush.brush_of(scene)[0].min_distance < 0.4
     painted.source = 'MIX'

@@ -119,10 +119,10 @@ def test_no_facet_of_what_is_outside_is_in_the_image(lens: float) -> None:
     assert pixels_of(facets, camera)[inside & ~seen & ~cover.hidden(prints)].max(initial=0.0) < 1.5
 
 
-@pytest.mark.parametrize(("most", "lost"), [(np.inf, 1e-6), (2.5e5, 0.15)])
+@pytest.mark.parametrize(("most", "lost"), [(np.inf, 1e-6), (2e5, 0.15)])
 def test_what_stands_far_behind_the_eye_is_no_larger_than_a_crown(most: float, lost: float) -> None:
     """No facet out of view is a roof over what is seen; all keep their area together, as far as there is room."""
-    flora, behind = support.alone("birch", BIRCH), support.grove(200, 8.0)
+    flora, behind = support.alone("birch", BIRCH), support.grove(185, 8.0)
     seeds = replace(behind, position=behind.position - np.array([0.0, 130.0, 0.0]))
     camera = support.camera((0, 0, 1.7), (0, 30, 1.7), pixels=WIDTH, view=0.7)
     result = replace(run(flora, seeds, camera)[1], lights=(SUN,))
@@ -173,7 +173,7 @@ def test_primitives_follow_the_image_however_deep_the_wood_is() -> None:
         every = support.plants(np.arange(len(place)), position=place)
         blocks, facets, _ = support.drawn(flora, run(flora, every, camera)[1], camera, 1.2, 0.6)
         numbers.append(sum(b.buffers.polygons for b in blocks) + len(facets))
-    assert numbers[1] < 1.5 * numbers[0]
+    assert numbers[1] < 1.4 * numbers[0]
     assert numbers[0] < 9.0 * camera.width * camera.height
 
 

@@ -63,7 +63,7 @@ def test_a_first_look_has_the_borders_of_what_replaces_it(wood, monkeypatch):
     """Of crowns that stand across them as well."""
     flora, seeds, _ = wood
     monkeypatch.setattr(subject, "TILE", 160)
-    small = support.camera((0, -60, 8), (0, 0, 8), pixels=480, view=0.9).smaller(192)
+    small = support.camera((0, -60, 8), (0, 0, 8), pixels=480, view=0.7).smaller(192)
     coverage = Coverage(small, (0, 1))
     ends = np.linspace(0, coverage.width, 4)
     for tile, made in made_by_tile(flora, seeds, small, 3, facet=4.0).items():

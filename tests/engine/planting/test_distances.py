@@ -19,8 +19,8 @@ def _distance(identifier: str) -> float:
     return suggested_distance([crown_of(load_species(identifier)).radius], [1.0])
 
 
-def test_a_birch_wood_stands_at_three_meters_and_grass_at_centimeters():
-    assert 2.5 <= _distance("birch") <= 3.5
+def test_a_birch_wood_stands_at_three_to_four_meters_and_grass_at_centimeters():
+    assert 3.0 <= _distance("birch") <= 4.0
     assert 5.0 <= _distance("beech") <= 8.0
     assert 0.1 <= _distance("grass") <= 0.4
     assert _distance("grass") < _distance("fern") < _distance("bush") < _distance("birch") < _distance("oak")
