@@ -102,7 +102,7 @@ def test_facets_are_evened_and_send_as_much_light(leaves: float, part: float) ->
     lit = LightRatios(np.ones(1), np.array([[0.0, 0.0, 1.0]]), np.array([part]))
     number, color = np.full(len(cosine), leaves), np.full((len(cosine), 3), 0.3)
     ratio = lit.colors(color, np.zeros(len(cosine), np.int64), normal, number)[:, 1] / 0.3
-    alone, together = 0.4 + cosine, (0.4 + cosine) * ratio
+    alone, together = 0.6 + cosine, (0.6 + cosine) * ratio
     assert together.mean() == pytest.approx(alone.mean(), rel=1e-3)
     assert together.std() <= alone.std() * (1.0 - 0.5 * part * (1.0 - 1.0 / leaves)) + 1e-9
     assert (np.diff(together) > 0.0).all()  # what faces the lamp stays the brightest
@@ -116,7 +116,7 @@ def test_bright_facets_send_as_much_light(bright: float, leaves: float) -> None:
     lit = LightRatios(np.ones(1), np.array([[0.0, 0.0, 1.0]]), np.ones(1))
     color = np.tile([bright, 0.2, 0.1], (len(cosine), 1))
     found = lit.colors(color, np.zeros(len(cosine), np.int64), normal, np.full(len(cosine), leaves))
-    light = (0.4 + cosine)[:, None]
+    light = (0.6 + cosine)[:, None]
     assert (light * found).mean(axis=0) == pytest.approx((light * color).mean(axis=0), rel=2e-3)
 
 
