@@ -32,10 +32,10 @@ _CHORD = 0.6
 #: What is seen is lit once and again by all the rest, of which a part is seen too: between the first power of the light
 #: that is scattered once, were only these surfaces to change, and the second, were all to.
 _POWER = 1.5
-#: All other light over that of a lamp on a sheet that faces it: of what reaches facets in a wood, 46 % comes straight from
-#: the sun, 24 % from the sky, the rest from leaves. With .4, woods were 1 % too bright. And the power of its own light by
-#: which a facet is evened: without, blobs of ``benchmarks exact --cases edge --species birch,spruce --seeds 2`` are 1,984
-#: and FLIP over noise .035; 1,570 and .032 with .9.
+#: All other light over that of a lamp on a sheet that faces it: of what reaches facets in a wood, 46 % comes straight
+#: from the sun, 24 % from the sky, the rest from leaves. With .4, woods were 1 % too bright. And the power of its own
+#: light by which a facet is evened: without, blobs of ``benchmarks exact --cases edge --species birch,spruce --seeds 2``
+#: are 1,984 and FLIP over noise .035; 1,570 and .032 with .9.
 _AMBIENT, _EVENED = 0.6, 0.9
 #: Arguments for which `overlap` and its mean are known, and points of quadratures.
 _KNOWN, _POINTS = np.geomspace(1e-3, 1e4, 141), 48
