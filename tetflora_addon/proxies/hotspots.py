@@ -35,7 +35,7 @@ _POWER = 1.5
 #: All other light over that of a lamp on a sheet that faces it: of what reaches facets in a wood, 46 % comes straight
 #: from the sun, 24 % from the sky, the rest from leaves. With .4, woods were 1 % too bright. And the power of its own
 #: light by which a facet is evened: without, blobs of ``exact --cases edge --species birch,spruce --seeds 2`` are 1,984
-#: are 1,984 and FLIP over noise .035; 1,570 and .032 with .9.
+#: and FLIP over noise .035; 1,570 and .032 with .9.
 _AMBIENT, _EVENED = 0.6, 0.9
 #: Arguments for which `overlap` and its mean are known, and points of quadratures.
 _KNOWN, _POINTS = np.geomspace(1e-3, 1e4, 141), 48
