@@ -156,13 +156,13 @@ _hooked = False
 
 @contextmanager
 def _watched(jail: Jail) -> Iterator[list[str]]:
-    """Collects paths outside the jail and Blender's own folders that Python is about to change."""
+    """Collects paths outside the jail, Blender's own folders and compiled modules that Python is about to change."""
     global _watching, _hooked
     if not _hooked:
         sys.addaudithook(_audit)
         _hooked = True
-    home = os.environ.get("BLENDER_USER_RESOURCES", "")
-    allowed = [os.path.realpath(jail.inside), *([os.path.realpath(home)] if home else [])]
+    own = jail.inside, os.environ.get("BLENDER_USER_RESOURCES"), sys.pycache_prefix
+    allowed = [os.path.realpath(path) for path in own if path]
     if "bpy" in sys.modules:
         allowed.append(os.path.realpath(sys.modules["bpy"].app.tempdir))
     written: list[str] = []

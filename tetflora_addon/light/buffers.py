@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import Floats, Integers, Mask
+from ..arrays import GOLDEN_TURN, Floats, Integers, Mask, chunks, spread
 from ..camera.camera import Camera
 from ..parallel import blocks
 from ..refinement.rasterize import buffer_size, image_places, occluder_depth, tetrahedron_fragments
@@ -24,8 +24,10 @@ from ..refinement.visibility import OPAQUE, depth_in_front
 BIAS = 1.5
 #: Points that are looked up together; some 500 bytes each.
 POINT_BATCH = 1 << 18
-#: Maximum number of parts along each side of a sheet, and maximum fraction of a pixel that a sheet covers.
-_MOST_CUTS, _MOST_COVERED = 64, 0.98
+#: Maximum number of parts of a sheet, and maximum fraction of a pixel that a sheet covers.
+_MOST_PARTS, _MOST_COVERED = 1 << 12, 0.98
+#: Golden section, by which parts of a sheet step along its second side.
+_GOLDEN = GOLDEN_TURN / (2.0 * np.pi)
 
 
 @dataclass(frozen=True)
@@ -102,16 +104,16 @@ class LightBuffer:
         self._own_key = own[self._by_cell]
 
     def _sheet_fragments(self, sheets: Floats) -> Iterator[tuple[NDArray, ...]]:
-        """Owner, pixel, entry, thickness 0 and optical depth of sheets, those of about the same size at a time.
+        """Owner, pixel, entry, thickness 0 and optical depth of sheets, some at a time.
 
         A sheet that covers the fraction c of a pixel lets 1 − c through: its optical depth is −ln (1 − c).
         """
         across = self.camera.pixel_size * self.camera.width / self.width
-        seen = np.flatnonzero(self._near_view(sheets, 2.0 * across))
-        numbers, sheets = seen, sheets[seen]
-        if not len(sheets):
-            return
-        center = sheets.mean(axis=1)
+        # The view may show part of the scene; where a sheet is not ahead, it would have parts without end.
+        center = sheets.mean(axis=1, dtype=np.float64)
+        reach = np.linalg.norm(sheets - center[:, None], axis=2).max(axis=1)
+        numbers = np.flatnonzero(self.camera.distance_to_view(center) <= reach)
+        sheets, center = sheets[numbers], center[numbers]
         vector = np.cross(sheets[:, 2] - sheets[:, 0], sheets[:, 3] - sheets[:, 1]) / 2.0
         if self.camera.kind == "ORTHO":
             seen, pixel_area = np.abs(vector @ self.camera.frame[:, 2]), np.full(len(sheets), across**2)
@@ -121,23 +123,24 @@ class LightBuffer:
             seen = np.abs(np.sum(vector * away, axis=1)) / distance
             # Beside the middle of a flat view a pixel sees less of the sphere.
             pixel_area = (across * distance) ** 2 * np.abs(away @ self.camera.frame[:, 2] / distance) ** 3
-        longest = np.linalg.norm(sheets - np.roll(sheets, 1, axis=1), axis=2).max(axis=1)
-        # Below the size of a pixel a sheet is where its middle is; above, its parts leave no pixel between them out.
-        pixels = longest / np.sqrt(np.maximum(pixel_area, 1e-18))
-        cuts = np.where(pixels <= 1.0, 1, np.clip(np.ceil(2.0 * pixels), 1, _MOST_CUTS)).astype(int)
+        # Below the size of a pixel a sheet is where its middle is; above, its parts leave no pixel between them out: as
+        # many as its area and length ask for, since blades of grass are long, and narrower than a pixel.
+        pixel_area = np.maximum(pixel_area, 1e-18)
         covered = seen / pixel_area
-        for count in np.unique(cuts):
-            x = (np.arange(count) + 0.5) / count
-            u, v = np.repeat(x, count), np.tile(x, count)
-            weights = np.stack([(1 - u) * (1 - v), u * (1 - v), u * v, (1 - u) * v], axis=1)
-            part_covers = covered / count**2
-            alike, step = np.flatnonzero(cuts == count), max(POINT_BATCH // int(count) ** 2, 1)
-            for start in range(0, len(alike), step):
-                some = alike[start : start + step]
-                points = np.einsum("kc,mcx->mkx", weights, sheets[some]).reshape(-1, 3)
-                owner, pixel, meters, fraction = self._gathered_parts(points, np.repeat(some, count**2), part_covers)
-                depth = -np.log1p(-np.minimum(fraction, _MOST_COVERED))
-                yield numbers[owner].astype(np.int32), pixel.astype(np.int32), meters, np.zeros(len(owner)), depth
+        longest = np.linalg.norm(sheets - np.roll(sheets, 1, axis=1), axis=2).max(axis=1) / np.sqrt(pixel_area)
+        number = np.where(longest > 1.0, np.fmin(np.ceil(4.0 * (covered + longest)), _MOST_PARTS), 1).astype(int)
+        covered /= number
+        corners = np.ascontiguousarray(sheets.transpose(1, 2, 0))
+        for some in chunks(number, POINT_BATCH - _MOST_PARTS):
+            owner, part = spread(number[some])
+            owner += some.start
+            # Even along sides as along diagonals: blades are long in either way.
+            u, v = (part + 0.5) / number[owner], ((part - (number[owner] - 1) / 2.0) * _GOLDEN + 0.5) % 1.0
+            weights = (1.0 - u) * (1.0 - v), u * (1.0 - v), u * v, (1.0 - u) * v
+            points = sum(c.take(owner, axis=1) * weight for c, weight in zip(corners, weights, strict=True)).T
+            owner, pixel, meters, fraction = self._gathered_parts(points, owner, covered)
+            depth = -np.log1p(-np.minimum(fraction, _MOST_COVERED))
+            yield numbers[owner].astype(np.int32), pixel.astype(np.int32), meters, np.zeros(len(owner)), depth
 
     def _gathered_parts(
         self, points: Floats, owner: Integers, covered: Floats
@@ -146,26 +149,16 @@ class LightBuffer:
 
         Parts are at ``points`` (m, 3), of sheets ``owner`` (m,); each of sheet i covers ``covered[i]`` of a pixel.
         """
-        taps, inside = self._taps(points)
+        place, meters, inside = self._places(points)
         owner = owner[inside]
-        nearest = taps.pixel[np.arange(len(owner)), taps.weight.argmax(axis=1)] if len(owner) else owner
+        column, row = np.clip(np.ceil(place).astype(np.int64) - 1, 0, [self.width - 1, self.height - 1]).T
+        nearest = row * self.width + column
         key, first, own = np.unique(
             owner * (self.width * self.height) + nearest, return_index=True, return_inverse=True
         )
         fraction = np.bincount(own.ravel(), covered[owner], len(key))
-        meters = np.bincount(own.ravel(), taps.meters, len(key)) / np.maximum(np.bincount(own.ravel()), 1)
+        meters = np.bincount(own.ravel(), meters, len(key)) / np.maximum(np.bincount(own.ravel()), 1)
         return owner[first], nearest[first], meters, fraction
-
-    def _near_view(self, sheets: NDArray[np.floating], margin: float) -> Mask:
-        """Sheets (m,) that may reach into a sun's view, which may show part of the scene; for other lights all."""
-        if self.camera.kind != "ORTHO":
-            return np.ones(len(sheets), bool)
-        left, right, bottom, top = self.camera.window
-        inside = np.ones(len(sheets), bool)
-        for axis, low, high in ((0, left, right), (1, bottom, top)):
-            place = (sheets - self.camera.position) @ self.camera.frame[:, axis]
-            inside &= (place.max(axis=1) >= low - margin) & (place.min(axis=1) <= high + margin)
-        return inside
 
     def __len__(self) -> int:
         return len(self._pixel)
@@ -245,32 +238,33 @@ class LightBuffer:
         (Hillis and Steele, "Data Parallel Algorithms", 1986).
         """
         through = np.exp(-self._depth.astype(np.float64))
-        light = emitted * (1.0 - through)[:, None]
-        every = np.arange(len(self))
-        longest = int((every - self._first).max()) + 1
+        light = (emitted * (1.0 - through)[:, None]).T.copy()
+        rank = np.arange(len(self)) - self._first
+        through[rank == 0] = 0.0  # from pixel to pixel
         step = 1
-        while step < longest:
-            some = np.flatnonzero(every - step >= self._first)
-            earlier = some - step
-            added = light[earlier] * through[some, None]
-            factor = through[earlier] * through[some]
-            light[some] += added
-            through[some] = factor
+        while step <= rank.max():
+            light[:, step:] += light[:, :-step] * through[step:]
+            through[step:] *= through[:-step]
             step *= 2
-        before = np.zeros_like(light)
-        later = np.flatnonzero(every > self._first)
-        before[later] = light[later - 1]
+        before = np.zeros((len(self), 3))
+        before[1:] = light[:, :-1].T
+        before[rank == 0] = 0.0
         return before
 
     def _key(self, pixel: NDArray, meters: Floats) -> Floats:
         return pixel + np.clip(meters / self._reach, 0.0, 1.0) * 0.999999
 
-    def _taps(self, points: Floats) -> tuple[_Taps, Mask]:
-        """Pixels around those points (k,) that are in view, and which these are (m,)."""
+    def _places(self, points: Floats) -> tuple[Floats, Floats, Mask]:
+        """Places (k, 2) in pixels of those points that are in view; how far away they are (k,); which (m,)."""
         size = np.array([self.width, self.height])
         place, depth, meters = image_places(self.camera, points, size)
         inside = (depth >= self.camera.near) & (place >= -1e-9).all(axis=1) & (place <= size + 1e-9).all(axis=1)
-        place = place[inside] - 0.5
+        return place[inside], meters[inside], inside
+
+    def _taps(self, points: Floats) -> tuple[_Taps, Mask]:
+        """Pixels around those points (k,) that are in view, and which these are (m,)."""
+        place, meters, inside = self._places(points)
+        place = place - 0.5
         low = np.floor(place)
         fraction = place - low
         pixels, weights = [], []
@@ -280,7 +274,7 @@ class LightBuffer:
                 row = np.clip(low[:, 1] + up, 0, self.height - 1).astype(np.int64)
                 pixels.append(row * self.width + column)
                 weights.append(np.abs(1 - aside - fraction[:, 0]) * np.abs(1 - up - fraction[:, 1]))
-        return _Taps(np.stack(pixels, axis=1), np.stack(weights, axis=1), meters[inside]), inside
+        return _Taps(np.stack(pixels, axis=1), np.stack(weights, axis=1), meters), inside
 
     def _last_before(self, taps: _Taps) -> tuple[Integers, Mask]:
         """The last fragment (k, 4) that begins in front of each point in each pixel, and whether there is one."""

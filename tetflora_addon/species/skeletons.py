@@ -132,13 +132,15 @@ def nurbs_chain(
         The control points themselves where they are too few for the knots.
     """
     polygon = Chains(control, np.array([0, len(control)]), np.array([cyclic]))
-    order = max(min(order, len(control)), 1)
+    order = min(order, len(control))
+    if order < 2:
+        return polygon
     if cyclic:
         around = np.arange(len(control) + order - 1) % len(control)
         control, weights = control[around], weights[around]
     n = len(control)
     index = np.arange(n + order)
-    repeated = order - 1 if bezier and not cyclic and order > 1 else 1
+    repeated = order - 1 if bezier and not cyclic else 1
     head = order if endpoint and not cyclic else min(2, repeated)
     knots = np.maximum((index - head) // repeated + 1, 0)
     if endpoint and not cyclic:

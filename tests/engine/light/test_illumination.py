@@ -14,6 +14,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tests.engine import support
+from tetflora_addon.camera.camera import Camera
 from tetflora_addon.emission.shells import set_apart
 from tetflora_addon.light import buffers
 from tetflora_addon.light.illumination import Illumination, Sources, Surfaces, shadow_steps
@@ -316,6 +317,18 @@ def random_sheets(seed: int, count: int, side: float) -> tuple[np.ndarray, np.nd
     return middle[:, None] + side / 2 * np.array([(-1, -1, 0), (1, -1, 0), (1, 1, 0), (-1, 1, 0)]), cell
 
 
+def counted_points(monkeypatch: pytest.MonkeyPatch) -> list[int]:
+    """Numbers of points that buffers look up together from now on."""
+    held, inner = [], buffers.image_places
+
+    def counted(camera: Camera, points: np.ndarray, size: np.ndarray) -> object:
+        held.append(len(points))
+        return inner(camera, points, size)
+
+    monkeypatch.setattr(buffers, "image_places", counted)
+    return held
+
+
 def test_sheets_shadow_those_below_and_not_themselves() -> None:
     """As rays find it: a sheet is lit as far as none lies above its middle."""
     corners, cell = random_sheets(9, 120, 0.4)
@@ -336,23 +349,45 @@ def test_however_many_sheets_are_drawn_few_points_are_held_at_once(monkeypatch: 
     """Small ones and large ones, which are cut into many parts; the light is the same to the last digit."""
     parts = [random_sheets(seed, 60, side) for seed, side in ((1, 0.01), (2, 0.1), (3, 0.6))]
     corners, cell = (np.concatenate(arrays) for arrays in zip(*parts, strict=True))
-    sheets, held = SurfaceElements.of(corners, cell, 6), []
+    sheets = SurfaceElements.of(corners, cell, 6)
 
     def light() -> np.ndarray:
         found = shadow_pass(box(5.0, 1), [SUN], DARK, resolution=128, sheets=sheets)
         return next(found.direct(corners.mean(axis=1), cell, np.arange(len(cell))))[1]
 
-    once, inner = light(), buffers.LightBuffer._taps
-
-    def counted(buffer: buffers.LightBuffer, points: np.ndarray) -> object:
-        held.append(len(points))
-        return inner(buffer, points)
-
-    monkeypatch.setattr(buffers.LightBuffer, "_taps", counted)
+    once, held = light(), counted_points(monkeypatch)
     monkeypatch.setattr(buffers, "POINT_BATCH", 5_000)
     assert np.array_equal(light(), once)
     assert sum(held) > 50_000
     assert max(held) <= 5_000
+
+
+@pytest.mark.parametrize("outline", [[(0, 0), (1, 0), (1, 1), (0, 1)], [(0, 0.5), (0.5, 0), (1, 0.5), (0.5, 1)]])
+@pytest.mark.parametrize("turn", [0.0, 0.6])
+def test_a_blade_of_grass_has_few_parts_and_no_gaps(outline, turn, monkeypatch: pytest.MonkeyPatch) -> None:
+    """As many as it is long, not the square of that; it hides as much as its area."""
+    corners = np.array([(*np.array(point) * (0.5, 0.008), -1.0) for point in outline])
+    corners = corners @ [[np.cos(turn), np.sin(turn), 0.0], [-np.sin(turn), np.cos(turn), 0.0], [0.0, 0.0, 1.0]]
+    held = counted_points(monkeypatch)
+    blade = SurfaceElements(corners[None], np.zeros(1, int), np.ones(6, bool))
+    (buffer,) = buffers_of(SUN, box(1.0, 1), blade, None, 256)
+    pixel = 4.0 / 256
+    assert sum(held) < 10 * 0.5 / pixel
+    area = np.linalg.norm(np.cross(corners[2] - corners[0], corners[3] - corners[1])) / 2
+    assert -np.expm1(-buffer._depth).sum() * pixel**2 == pytest.approx(area, rel=0.01)
+    column, row = buffer._pixel % buffer.width, buffer._pixel // buffer.width
+    along = np.unique(column if np.ptp(column) > np.ptp(row) else row)
+    assert np.diff(along)[1:-1].max() == 1  # tips are as good as nothing
+
+
+def test_what_a_view_of_a_lamp_does_not_show_costs_it_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Six views look all around a lamp; what stands beside one of them would have parts without end there."""
+    corners, cell = random_sheets(11, 200, 0.01)
+    held = counted_points(monkeypatch)
+    lamp = Light("POINT", np.array([0.1, 0.2, -2.0]), DOWN)
+    made = buffers_of(lamp, box(1.0, 1), SurfaceElements.of(corners, cell, 6), None, 128)
+    assert len(made) == 6
+    assert sum(held) < 6 * 200
 
 
 def test_samples_stand_for_their_key_points() -> None:

@@ -62,6 +62,15 @@ def test_nurbs_move_with_their_points_and_stay_among_them(
         np.testing.assert_allclose(made.points[[0, -1]], control[[0, -1]], atol=1e-12)
 
 
+@pytest.mark.parametrize("count", [0, 1])
+@pytest.mark.parametrize("flag", ["cyclic", "endpoint", "bezier"])
+def test_a_nurbs_spline_of_one_point_is_that_point(count: int, flag: str) -> None:
+    control = _random(5, count)
+    made = nurbs_chain(control, np.ones(count), 4, 12, **{flag: True})
+    np.testing.assert_array_equal(made.points, control)
+    np.testing.assert_array_equal(made.first, [0, count])
+
+
 @pytest.mark.parametrize("order", [2, 3, 4, 5])
 def test_nurbs_that_end_at_their_points_are_those_of_scipy(order: int) -> None:
     control, weights = _random(7, 9), np.random.default_rng(7).uniform(0.2, 3, 9)
