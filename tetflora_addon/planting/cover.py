@@ -171,7 +171,7 @@ class Habitat(Enum):
     """Where plants of a kind are found, with the size of their patches in meters and how much they keep to them."""
 
     ANYWHERE = (0.0, 0.0)
-    LIGHT = (3.5, 0.75)
+    LIGHT = (3.5, 0.25)
     HALF_SHADE = (2.4, 0.9)
     SHADE = (1.8, 0.85)
     LITTER = (1.1, 0.45)

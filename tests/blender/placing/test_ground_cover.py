@@ -321,5 +321,6 @@ def test_large_ground_has_no_more_plants_than_blender_bears():
     _wood(size=2000.0)
     add_plant("one", "birch")
     cover = _cover(soil=False)
-    assert cover.density / 10_000 * 4000.0**2 == pytest.approx(MOST, rel=1e-3)
+    # Nearly as many stand as may: what finds no place, as litter far from its tree, takes none from the others.
+    assert 0.75 * MOST < cover.made <= MOST
     assert not rules.is_outdated(cover)

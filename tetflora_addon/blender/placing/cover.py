@@ -37,8 +37,9 @@ NAME, FALLEN_LEAVES = "Ground cover", "Fallen leaves"
 _SQUARE = 0.976  # mean square of the scales of a cover's plants
 #: What grows: species, habitat, plants on a square meter of ground that suits.
 GROWN = (
-    ("wood_grass", 'LIGHT', 16.0),
-    ("grass", 'LIGHT', 0.25),
+    ("sward", 'LIGHT', 11.0),
+    ("wood_grass", 'LIGHT', 1.5),
+    ("grass", 'LIGHT', 0.3),
     ("flower", 'LIGHT', 0.15),
     ("fern", 'HALF_SHADE', 0.12),
     ("wood_sorrel", 'HALF_SHADE', 3.0),
@@ -46,7 +47,7 @@ GROWN = (
 )
 #: What falls: kind, habitat, pieces on a square meter of ground that is wholly covered, of how many species.
 DROPPED = (("litter", 'LITTER', 12.0, 4), ("branch", 'DEAD_WOOD', 0.35, 2), ("log", 'DEAD_WOOD', 0.012, 1))
-#: Plants that a cover is made of at most by itself; on larger ground they stand farther apart.
+#: Plants that a cover has at most by itself; on larger ground they stand farther apart.
 MOST = 1_000_000
 #: Lower plants shed nothing that would be seen, meters.
 _SHEDS = 1.2
@@ -56,7 +57,7 @@ ANYBODY = "plants"
 _PLANTING, _UNDER = 0.7, "Light and litter under the plants"
 _PAGES = {**FALLEN, KIND: leaves_page}
 #: Soil without anything on it, and dead grass between what grows in the light, in its shade; linear RGB.
-HUMUS, THATCH = np.array([0.036, 0.025, 0.016]), np.array([0.1, 0.08, 0.042])
+HUMUS, THATCH = np.array([0.036, 0.025, 0.016]), np.array([0.108, 0.084, 0.044])
 
 
 @dataclass(frozen=True)
@@ -131,10 +132,13 @@ def cover_steps(
     with populations.restored(scene):
         parts = _parts(scene, canopy, above)
         found = cover_of(scene, uid) or _add_cover(scene, population, grounds, masks)
-        _mix(found, parts, ground.map_area)
+        # What falls from crowns lies under these only, and takes no plants from the rest of the ground.
+        suited = [floor.map_of(Habitat[part.habitat], shedder_of(part, above)).mean() for part in parts]
+        area = ground.map_area * float(np.average(suited, weights=[part.number for part in parts]))
+        _mix(found, parts, area)
         with closing(populations.make_plants_steps(scene, depsgraph, found)) as steps:
             made = yield from part_of(steps, _PLANTING, 1.0)
-        bare = _lay_soil(scene, cover_of(scene, uid), grounds, floor, above, ground.map_area) if soil else []
+        bare = _lay_soil(scene, cover_of(scene, uid), grounds, floor, above, area) if soil else []
     return CoverResult(made, bare)
 
 
@@ -243,12 +247,7 @@ def _mix(cover: bpy.types.PropertyGroup, parts: list[Ingredient], area: float) -
     if before and cover.density:
         cover.density *= whole / before
     else:
-        cover.density = whole * distances.HECTARE * _affordable(whole, area)
-
-
-def _affordable(density: float, area: float) -> float:
-    """Fraction of so many plants on each of so many square meters that are planted."""
-    return min(1.0, MOST / max(density * area, 1e-9))
+        cover.density = distances.HECTARE * min(whole, MOST / max(area, 1e-9))
 
 
 def _lay_soil(
@@ -279,13 +278,13 @@ def _strata(
     """What lies on the ground, and what grows on it: in numbers as if large ground had room for all that it should."""
     weights = sum(entry.weight for entry in cover.mix) or 1.0
     thin = cover.density / distances.HECTARE / weights
-    thin = max(thin, min(thin / _affordable(weights, area), 1.0))
+    thin = max(thin, min(thin * max(weights * area / MOST, 1.0), 1.0))
     lying: list[Stratum] = []
     growing: list[Stratum] = []
     for entry in cover.mix:
         habitat, crown = Habitat[entry.habitat], crown_for(scene, entry.species)
         suits: Floats = floor.map_of(habitat, shedder_of(entry, above))
-        patch = 0.6 if habitat.value[1] else 1.0  # of the ground is within patches
+        patch = 1.0 - 0.585 * habitat.value[1]  # of the ground is within patches, on average
         one = Stratum(patch * suits, thin * entry.weight, crown.seen, np.array(crown.color))
         (lying if habitat.falls else growing).append(one)
     return lying, growing

@@ -1,0 +1,63 @@
+# SPDX-FileCopyrightText: 2026 TetFlora Authors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The grass of Ground Cover closes over open ground, as that of hay meadows, whose sward is dense and without gaps.
+
+Arrhenatherion elatioris in Hájková et al. 2007, "Vegetation of the Czech Republic 1", and Delarze and Gonseth 2015,
+"Lebensräume der Schweiz", 4.5.1: a dense, continuous carpet of herbs.
+"""
+
+from __future__ import annotations
+
+import bpy
+import numpy as np
+import pytest
+from mathutils.bvhtree import BVHTree
+
+from tests.blender.scenes import add_mesh, add_plant, depsgraph
+from tetflora_addon.blender.job.plant_mesh import plant_parts, single_seed
+from tetflora_addon.blender.placing import populations
+from tetflora_addon.blender.placing.cover import cover_steps
+from tetflora_addon.blender.scene import fields
+from tetflora_addon.blender.species.edits import species_for
+from tetflora_addon.blender.worker import run_to_end
+from tetflora_addon.compiled.flora import compile_species
+
+pytestmark = pytest.mark.usefixtures("clean_file")
+
+#: Side of what is looked at, and how far around it plants may reach into it, meters; rays along the side.
+_SEEN, _AROUND, _RAYS = 4.0, 0.7, 60
+
+
+def _tree(read: fields.Seeds, near: np.ndarray) -> BVHTree:
+    """Every polygon of some plants of a cover, in three variants of each species."""
+    variants = {}
+    for kind in np.unique(read.species[near]).tolist():
+        name = read.identifiers[kind]
+        flora = compile_species([species_for(bpy.context.scene, name)])
+        variants[kind] = [[b for *_, b in plant_parts(flora, single_seed(name, seed))] for seed in range(3)]
+    points, polygons, count = [], [], 0
+    for plant in near.tolist():
+        for part in variants[int(read.species[plant])][plant % 3]:
+            points.append(part.positions @ read.frame[plant].T * read.scale[plant] + read.position[plant])
+            corners = np.split(part.corner_verts + count, part.face_offsets[1:-1])
+            polygons += [face.tolist() for face in corners]
+            count += len(part.positions)
+    return BVHTree.FromPolygons(np.concatenate(points).tolist(), polygons)
+
+
+def test_grass_hides_most_of_open_ground() -> None:
+    """From 80 to 100 % of it, from straight above."""
+    ground = add_mesh("ground", size=8.0)
+    add_plant("far", "birch", 1, (100.0, 0.0, 0.0))
+    scene = bpy.context.scene
+    cover = populations.add_population(scene, [ground], name="open")
+    run_to_end(cover_steps(scene, depsgraph(), cover, grounds=[ground]))
+    bpy.context.view_layer.update()
+    (field,) = [o for o in scene.objects if o.tetflora.is_field]
+    read = fields.read_field(field, depsgraph(), np.eye(4)[None])
+    near = np.flatnonzero((np.abs(read.position[:, :2]) < _SEEN / 2 + _AROUND).all(axis=1))
+    tree = _tree(read, near)
+    side = (np.arange(_RAYS) + 0.5) / _RAYS * _SEEN - _SEEN / 2
+    # Blades that lie below the ground hide nothing.
+    hidden = [tree.ray_cast((x, y, 3.0), (0.0, 0.0, -1.0), 3.0)[0] is not None for x in side for y in side]
+    assert 0.8 <= np.mean(hidden) <= 1.0
