@@ -1,9 +1,8 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The grass of Ground Cover closes over open ground, as that of hay meadows, whose sward is dense and without gaps.
+"""The grass of Ground Cover closes over open ground, as that of hay meadows: "a dense and continuous carpet of herbs".
 
-Arrhenatherion elatioris in Hájková et al. 2007, "Vegetation of the Czech Republic 1", and Delarze and Gonseth 2015,
-"Lebensräume der Schweiz", 4.5.1: a dense, continuous carpet of herbs.
+Info Flora, Habitats of Switzerland (TypoCH), 4.5.1, hay meadows of low altitude.
 """
 
 from __future__ import annotations
