@@ -53,8 +53,7 @@ class TETFLORA_OT_refine(ModalJob, Operator, label="Refine", needs=(in_object_mo
         scene, nothing = context.scene, not has_results(context.scene)
         made_for, expected = auto.results_made_for(scene), forecast(scene, context.view_layer)
         with auto.paused():
-            depsgraph = context.evaluated_depsgraph_get()
-            job = refine.refine_steps(scene, depsgraph, first_look=nothing)
+            job = refine.refine_steps(scene, context.evaluated_depsgraph_get(), first_look=nothing)
             try:
                 statistics = yield from job
                 auto.note_results(scene, made_for)

@@ -7,7 +7,8 @@ import bpy
 from ..operators.layers import grounds_to_plant
 from ..tetflora_addon.blender.biomes.layers import GROUP, STAND, active_layer, is_due, is_gone, kind_of, plants_in
 from ..tetflora_addon.blender.biomes.library import FALLBACK_ICON, biomes, icon_of, items
-from ..tetflora_addon.blender.placing.distances import distance_to_draw, follows_species
+from ..tetflora_addon.blender.placing.distances import follows_species, suggestion
+from ..tetflora_addon.blender.scene.crowns import crown_to_draw
 from ..tetflora_addon.blender.scene.fields import has_history
 from ..tetflora_addon.blender.settings import BIOME, FIELD, SCATTER, active_in
 from ..tetflora_addon.blender.viewport import points
@@ -230,10 +231,9 @@ def _draw_spacing(layout: bpy.types.UILayout, layer: bpy.types.PropertyGroup) ->
 
 def draw_distance(layout: bpy.types.UILayout, settings: bpy.types.PropertyGroup) -> None:
     """The switch between the distance that suits the species and the artist's own, and the one that counts."""
-    row = layout.row(heading="Min Distance")
-    row.prop(settings, "distance_by_species")
+    layout.row(heading="Min Distance").prop(settings, "distance_by_species")
     if follows_species(settings):
-        found = distance_to_draw(settings)
+        found = suggestion(settings, crown_to_draw)  # None for a moment, until the crowns of the species are known
         draw_below(layout, "…" if found is None else shown_length(found))
     else:
         layout.prop(settings, "min_distance", text=" ")

@@ -256,7 +256,6 @@ def fitted(flora: Flora, seeds: Seeds, height: Floats, width: Floats, times: int
 
     Parameters
     ----------
-    flora : Flora
     seeds : Seeds of n
     height, width : (n,) float64
         Meters.
@@ -274,8 +273,7 @@ def fitted(flora: Flora, seeds: Seeds, height: Floats, width: Floats, times: int
     def work(some: Integers) -> None:
         own, wanted, factor = seeds.take(some), width[some] / height[some], np.ones(len(some))
         crown = np.tile(PLAIN, (len(own), 1)) if own.crown is None else own.crown
-        row = flora.first_row[own.species]
-        most = np.where(are_stools(flora.rows, row), MOST_LEANING, MOST[WIDTH])
+        most = np.where(are_stools(flora.rows, flora.first_row[own.species]), MOST_LEANING, MOST[WIDTH])
         tall, left = np.ones(len(own)), np.arange(len(own))
         for _ in range(times):
             shaped = crown[left]

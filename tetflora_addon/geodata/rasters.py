@@ -205,8 +205,7 @@ def read_ascii(path: Path) -> Generator[Progress, object, Raster]:
         done, start, line = done + len(found), end, line + piece.count(b"\n")
     if done < len(values):
         raise SceneError(f"{name}: line {line}: it ends after {done:,} of {len(values):,} values; get it again")
-    nothing = header.get("nodata_value", -9999.0)
-    values = without_nodata(values.reshape(height, width), nothing)
+    values = without_nodata(values.reshape(height, width), header.get("nodata_value", -9999.0))
     first = np.array([corner[0], corner[1] + (height - 1) * dy])
     return Raster(values, first, *upright(dx, dy), system_beside(path))
 

@@ -84,8 +84,7 @@ class Records(Arrays):
         exact = part == 1.0
         for name, value in mixed.items():
             value[exact] = getattr(second, name)[exact]
-        years = np.full(len(after), year, np.float32)
-        return replace(first, year=years, **mixed)
+        return replace(first, year=np.full(len(after), year, np.float32), **mixed)
 
 
 def in_order(rows: Records) -> Records:
