@@ -14,7 +14,7 @@ Plants come planted, or from seeds of the plants around and of the woods outside
 they are structures of arrays; records are what a simulation says of them at several years.
 """
 
-from collections.abc import Generator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from enum import IntEnum
 from typing import Self
@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 from ..arrays import Arrays, Floats, Floats32, Integers, Integers32, Keys, Mask, column, nested
 from ..errors import TetFloraError
 from ..growth.hashing import child_key, key_of_seed, uniform
-from ..jobs import Progress
+from ..jobs import Job, Progress
 from ..parallel import blocks, on_all_cores
 from ..parameters import script_setting, setting, within
 from ..species.ecology import crown_leaves
@@ -529,9 +529,7 @@ class StandSettings:
     open_edges: bool = script_setting(False)
 
 
-def grow(
-    site: StandSite, species: Sequence[StandSpecies], settings: StandSettings
-) -> Generator[Progress, object, Records]:
+def grow(site: StandSite, species: Sequence[StandSpecies], settings: StandSettings) -> Job[Records]:
     """Grow a stand; a job, which yields after each year and returns its records.
 
     These are of plants at year 0, each ``interval`` years, at the end, and whenever one appears, dies, falls or is
