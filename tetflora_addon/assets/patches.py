@@ -381,8 +381,7 @@ def _divided(
     half = np.bincount(owner, before < load[owner] / 2, len(low)).astype(np.int64)
     half = np.clip(half, 1, np.maximum(size - 1, 1))
     middle = low + half
-    times = 1 + dividing
-    runs = np.repeat(np.arange(len(low)), times)
+    runs = np.repeat(np.arange(len(low)), 1 + dividing)
     second = np.diff(runs, prepend=-1) == 0
     new_low = np.where(second, middle[runs], low[runs])
     new_high = np.where(~second & dividing[runs], middle[runs], high[runs])

@@ -297,8 +297,7 @@ def fitted(flora: Flora, seeds: Seeds, height: Floats, width: Floats, times: int
 def _by_kind(flora: Flora, seeds: Seeds, work: Callable[[Integers], None]) -> None:
     """Do some work on some plants (k,) at a time, each kind apart, as kinds have more or fewer limbs."""
     order = np.argsort(seeds.species, kind="stable")
-    ends = np.flatnonzero(np.diff(seeds.species[order])) + 1
-    kinds = np.split(order, ends)
+    kinds = np.split(order, np.flatnonzero(np.diff(seeds.species[order])) + 1)
     for some in kinds:
         if len(some):
             _beyond(flora.in_leaf, int(seeds.species[some[0]]))

@@ -673,8 +673,7 @@ class GrowingStand:
         self._decay(year, False)
         end = [self.plants.records(year, self.traits, self.site), self.dead.records(year)]
         tall = np.flatnonzero(end[0].height >= self.settings.min_height)
-        known = Records.concatenate([*self.kept, end[0].take(tall), end[1]])
-        first = in_order(known)
+        first = in_order(Records.concatenate([*self.kept, end[0].take(tall), end[1]]))
         if not len(first):
             return first
         # A dead tree that falls in the last year is recorded twice: the same row.
