@@ -346,7 +346,14 @@ class TETFLORA_OT_paint_plants(GroundTool, Operator, label="Paint Plants"):
     def _go_on_stroke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
         self.point(context, event)
         if (event.type == 'LEFTMOUSE' and event.value == 'RELEASE') or event.type == 'ESC':
-            self._end_stroke(context)
+            stroke, self._stroke = self._stroke, None
+            stroke.finish()
+            self._done = _result_of(stroke)
+            if stroke.added or stroke.removed:
+                remove_empty_collections()
+                self._changed = True
+                context.view_layer.update()
+                self.pushed(context, f"{_DONE[stroke.mode].capitalize()} Plants")
         elif event.type == 'MOUSEMOVE' and self._hit is not None:
             self._drag(context, event)
         self.show(context, event)
@@ -408,16 +415,6 @@ class TETFLORA_OT_paint_plants(GroundTool, Operator, label="Paint Plants"):
         for center in way:
             self._stroke.dab(center, pressure)
         self._last = tuple(place)
-
-    def _end_stroke(self, context: bpy.types.Context) -> None:
-        stroke, self._stroke = self._stroke, None
-        stroke.finish()
-        self._done = _result_of(stroke)
-        if stroke.added or stroke.removed:
-            remove_empty_collections()
-            self._changed = True
-            context.view_layer.update()
-            self.pushed(context, f"{_DONE[stroke.mode].capitalize()} Plants")
 
     def show(self, context: bpy.types.Context, event: bpy.types.Event) -> None:
         settings = context.scene.tetflora.brush

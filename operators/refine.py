@@ -23,25 +23,15 @@ from ..tetflora_addon.blender.viewport.warnings import cut_off
 from ..tetflora_addon.jobs import Job
 from ..tetflora_addon.preview.levels import Levels
 from ..tetflora_addon.refinement.loop import Statistics
-from .base import (
-    NO_CAMERA,
-    ModalJob,
-    Reporting,
-    counted,
-    in_object_mode,
-    need,
-    plants_selected,
-    select_only,
-    selected_plants,
-)
+from . import base
 
 _WARNINGS = 4  # about assets, that are told one by one
 
 
-_has_camera = need(lambda context: context.scene.camera is not None, NO_CAMERA)
+_has_camera = base.need(lambda context: context.scene.camera is not None, base.NO_CAMERA)
 
 
-class TETFLORA_OT_refine(ModalJob, Operator, label="Refine", needs=(in_object_mode, _has_camera)):
+class TETFLORA_OT_refine(base.ModalJob, Operator, label="Refine", needs=(base.in_object_mode, _has_camera)):
     """Create meshes of plants near the scene camera and proxies of the others, replacing earlier results.
 
     Esc cancels without changes; Return stops refining and creates what has been decided so far.
@@ -53,8 +43,7 @@ class TETFLORA_OT_refine(ModalJob, Operator, label="Refine", needs=(in_object_mo
         scene, nothing = context.scene, not has_results(context.scene)
         made_for, expected = auto.results_made_for(scene), forecast(scene, context.view_layer)
         with auto.paused():
-            depsgraph = context.evaluated_depsgraph_get()
-            job = refine.refine_steps(scene, depsgraph, first_look=nothing)
+            job = refine.refine_steps(scene, context.evaluated_depsgraph_get(), first_look=nothing)
             try:
                 statistics = yield from job
                 auto.note_results(scene, made_for)
@@ -95,17 +84,17 @@ class TETFLORA_OT_refine(ModalJob, Operator, label="Refine", needs=(in_object_mo
 def _made(scene: bpy.types.Scene, statistics: Statistics) -> str:
     """What was refined, and what of it was made."""
     seconds = f"in {sum(statistics.seconds.values()):.1f} s"
-    instances = counted(statistics.instances, "instance")
+    instances = base.counted(statistics.instances, "instance")
     if not (statistics.passes or statistics.plants) and statistics.instances_whole == statistics.instances > 0:
         why = "" if scene.tetflora.expand_everything else ", as the renderer draws these at the least cost"
         return f"{instances} of assets stay the originals{why}"
-    what = [counted(statistics.plants, "plant")] if statistics.plants or not statistics.instances else []
+    what = [base.counted(statistics.plants, "plant")] if statistics.plants or not statistics.instances else []
     what += [f"{instances} of assets"] if statistics.instances else []
     made = f"{statistics.polygons_meshed:,} of {statistics.polygons_full:,} polygons"
     if statistics.instances:
-        made = f"{counted(statistics.instances_whole, 'original')}, "
-        made += f"{counted(statistics.instances_clusters, 'cluster')}, {statistics.polygons_meshed:,} polygons"
-    return f"{' and '.join(what)}: {made}, {counted(statistics.tetrahedra_proxy, 'proxy')} {seconds}"
+        made = f"{base.counted(statistics.instances_whole, 'original')}, "
+        made += f"{base.counted(statistics.instances_clusters, 'cluster')}, {statistics.polygons_meshed:,} polygons"
+    return f"{' and '.join(what)}: {made}, {base.counted(statistics.tetrahedra_proxy, 'proxy')} {seconds}"
 
 
 def _unread_world(scene: bpy.types.Scene) -> str:
@@ -129,7 +118,7 @@ def _unseen(scene: bpy.types.Scene, statistics: Statistics) -> str:
 
 # Meshes stay hidden where results were deleted by hand. Only then are all objects looked through: a panel asks at every
 # movement of the mouse.
-_clearable = need(
+_clearable = base.need(
     lambda context: (
         has_results(context.scene) or (context.scene.tetflora.statistics and hiding.hidden_originals(context.scene))
     ),
@@ -137,7 +126,7 @@ _clearable = need(
 )
 
 
-class TETFLORA_OT_clear(Reporting, Operator, label="Clear", needs=(in_object_mode, _clearable)):
+class TETFLORA_OT_clear(base.Reporting, Operator, label="Clear", needs=(base.in_object_mode, _clearable)):
     """Remove all meshes, materials and proxies that Refine created, and nothing else.
 
     Plants remain, and hidden meshes are shown again.
@@ -147,18 +136,18 @@ class TETFLORA_OT_clear(Reporting, Operator, label="Clear", needs=(in_object_mod
         auto.stop()
         stop_jobs("its results were cleared")
         hidden = hiding.hidden_originals(context.scene, 'VIEW')
-        removed = f"{counted(refine.clear(context.scene), 'datablock')} removed"
+        removed = f"{base.counted(refine.clear(context.scene), 'datablock')} removed"
         shown = sum(hiding.HIDDEN['VIEW'] not in original for original in hidden)
-        return self.done(f"{removed}, {counted(shown, 'object')} shown again" if shown else removed)
+        return self.done(f"{removed}, {base.counted(shown, 'object')} shown again" if shown else removed)
 
 
-_has_results = need(
+_has_results = base.need(
     lambda context: has_results(context.scene), "No results to keep; click Refine, or wait until it is done"
 )
 
 
 class TETFLORA_OT_keep_results(
-    Reporting, Operator, label="Keep Results as Meshes", needs=(in_object_mode, _has_results)
+    base.Reporting, Operator, label="Keep Results as Meshes", needs=(base.in_object_mode, _has_results)
 ):
     """Turn the results into ordinary meshes that are saved in the file and can be edited.
 
@@ -172,11 +161,11 @@ class TETFLORA_OT_keep_results(
         kept = keep_results(scene)
         scene.tetflora.refine_at_render = False
         scene.tetflora.statistics = ""
-        return self.done(f"{counted(kept, 'object')} kept as meshes; Refine at Render is off")
+        return self.done(f"{base.counted(kept, 'object')} kept as meshes; Refine at Render is off")
 
 
 class TETFLORA_OT_make_plant_mesh(
-    ModalJob, Operator, label="Convert Plants to Meshes", needs=(in_object_mode, plants_selected)
+    base.ModalJob, Operator, label="Convert Plants to Meshes", needs=(base.in_object_mode, base.plants_selected)
 ):
     """Create an ordinary mesh object of each selected plant, with every branch and leaf, to edit, export or animate.
 
@@ -184,22 +173,22 @@ class TETFLORA_OT_make_plant_mesh(
     """
 
     def steps(self, context: bpy.types.Context) -> Job[list[bpy.types.Object]]:
-        return make_plant_mesh_steps(context.scene, context.evaluated_depsgraph_get(), selected_plants(context))
+        return make_plant_mesh_steps(context.scene, context.evaluated_depsgraph_get(), base.selected_plants(context))
 
     def finish(self, context: bpy.types.Context, made: list[bpy.types.Object]) -> set[str]:
         context.view_layer.update()
-        select_only(context, made)
+        base.select_only(context, made)
         polygons = sum(len(obj.data.polygons) for obj in made)
-        return self.done(f"{counted(len(made), 'mesh object')} of {polygons:,} polygons made")
+        return self.done(f"{base.counted(len(made), 'mesh object')} of {polygons:,} polygons made")
 
 
-_camera_found = need(
+_camera_found = base.need(
     lambda context: context.scene.camera is not None or getattr(state.find(context.scene), "frozen", None) is not None,
-    NO_CAMERA,
+    base.NO_CAMERA,
 )
 
 
-class TETFLORA_OT_preview_levels(ModalJob, Operator, label="Compute Levels", needs=(_camera_found,)):
+class TETFLORA_OT_preview_levels(base.ModalJob, Operator, label="Compute Levels", needs=(_camera_found,)):
     """Refine for the scene camera, or the frozen one, without creating meshes, and keep every level to step through in
     viewports.
 
@@ -230,5 +219,5 @@ class TETFLORA_OT_preview_levels(ModalJob, Operator, label="Compute Levels", nee
         last = levels.levels[-1]
         context.scene.tetflora.preview.level = last.number
         return self.done(
-            f"{counted(len(levels), 'level')}, {len(last):,} tetrahedra with plants, {levels.nbytes / 1e6:.0f} MB"
+            f"{base.counted(len(levels), 'level')}, {len(last):,} tetrahedra with plants, {levels.nbytes / 1e6:.0f} MB"
         )

@@ -48,8 +48,7 @@ class TETFLORA_OT_duplicate_species(Reporting, Operator, label="Duplicate as New
         editor = scene.tetflora.species_editor
         data = copy.deepcopy(edits.species_data(scene, present_species(editor)))
         data["name"] = self.name.strip() or self._suggestion(context)
-        known = edits.catalog()
-        identifier = edits.new_identifier(data["name"], known.__contains__)
+        identifier = edits.new_identifier(data["name"], edits.catalog().__contains__)
         edits.store_species(scene, identifier, data)
         editor.species = identifier
         changed = assign_species(selected_plants(context), identifier) if self.assign else 0

@@ -29,7 +29,6 @@ def panel(
 
     Parameters
     ----------
-    label : str
     manual : str
         Page of the manual, and its heading, which a button in the header opens.
     tab : str

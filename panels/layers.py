@@ -7,32 +7,19 @@ import bpy
 from ..operators.layers import grounds_to_plant
 from ..tetflora_addon.blender.biomes.layers import GROUP, STAND, active_layer, is_due, is_gone, kind_of, plants_in
 from ..tetflora_addon.blender.biomes.library import FALLBACK_ICON, biomes, icon_of, items
-from ..tetflora_addon.blender.placing.distances import distance_to_draw, follows_species
+from ..tetflora_addon.blender.placing.distances import follows_species, suggestion
+from ..tetflora_addon.blender.scene.crowns import crown_to_draw
 from ..tetflora_addon.blender.scene.fields import has_history
 from ..tetflora_addon.blender.settings import BIOME, FIELD, SCATTER, active_in
 from ..tetflora_addon.blender.viewport import points
-from .base import (
-    Button,
-    draw_below,
-    draw_buttons,
-    draw_message,
-    draw_numbers,
-    draw_properties,
-    draw_species,
-    draw_where,
-    menu,
-    panel,
-    popover,
-    section,
-    shown_length,
-)
+from . import base
 
 #: Imports of real places, in the order in which a place is built.
 IMPORTS = (
-    Button("import_terrain", 'RNDCURVE'),
-    Button("import_canopy", 'OUTLINER_OB_POINTCLOUD'),
-    Button("import_inventory", 'SPREADSHEET'),
-    Button("import_outlines", 'OUTLINER_OB_CURVE'),
+    base.Button("import_terrain", 'RNDCURVE'),
+    base.Button("import_canopy", 'OUTLINER_OB_POINTCLOUD'),
+    base.Button("import_inventory", 'SPREADSHEET'),
+    base.Button("import_outlines", 'OUTLINER_OB_CURVE'),
 )
 
 
@@ -49,7 +36,7 @@ class TETFLORA_UL_layers(bpy.types.UIList):
         named = item.field if item.kind == FIELD and item.field is not None else item
         handle = row.row()
         handle.scale_x = 0.6
-        Button("move_layer", 'GRIP', "", {"direction": 'DRAG', "layer": item.uid}).draw(handle, emboss=False)
+        base.Button("move_layer", 'GRIP', "", {"direction": 'DRAG', "layer": item.uid}).draw(handle, emboss=False)
         row.prop(named, "name", text="", emboss=False, icon=kind.icon)
         right = row.row(align=True)
         right.alignment = 'RIGHT'
@@ -73,7 +60,7 @@ def _short(number: int) -> str:
     return f"{number / 1e3:.0f} k" if number < 1e6 else f"{number / 1e6:.1f} M"
 
 
-@menu("TetFlora Biome")
+@base.menu("TetFlora Biome")
 def TETFLORA_MT_add_biome(layout: bpy.types.UILayout, _context: bpy.types.Context) -> None:
     """Biomes to add to the selected ground, or with land of their own."""
     layout.operator_context = 'INVOKE_DEFAULT'
@@ -83,7 +70,7 @@ def TETFLORA_MT_add_biome(layout: bpy.types.UILayout, _context: bpy.types.Contex
         layout.operator("tetflora.add_biome", text=info.name, **icon).biome = info.identifier
 
 
-@popover("Add Layer", 30)
+@base.popover("Add Layer", 30)
 def TETFLORA_PT_add_layer(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
     """What can grow on the selected meshes; opened from the list of layers."""
     grounds = grounds_to_plant(context)
@@ -95,53 +82,53 @@ def TETFLORA_PT_add_layer(layout: bpy.types.UILayout, context: bpy.types.Context
         cell = pictures.column(align=True)
         cell.template_icon(icon if isinstance(icon, int) else 0, scale=5.0)
         row = cell.row(align=True)
-        Button("add_biome", 'NONE', name, {"biome": identifier}).draw(row)
+        base.Button("add_biome", 'NONE', name, {"biome": identifier}).draw(row)
         if identifier in known and known[identifier].is_own:
-            Button("delete_file", 'TRASH', "", {"biome": True, "identifier": identifier}).draw(row)
+            base.Button("delete_file", 'TRASH', "", {"biome": True, "identifier": identifier}).draw(row)
     layout.separator()
     columns = layout.split()
-    draw_buttons(
+    base.draw_buttons(
         columns.column(),
-        Button("populate", 'OUTLINER_OB_POINTCLOUD', "Scatter", {"by_density": True}),
-        Button("grow_stand", 'TIME', "Stand"),
-        Button("ground_cover", 'OUTLINER_OB_CURVES'),
-        Button("paint_plants", 'BRUSH_DATA'),
+        base.Button("populate", 'OUTLINER_OB_POINTCLOUD', "Scatter", {"by_density": True}),
+        base.Button("grow_stand", 'TIME', "Stand"),
+        base.Button("ground_cover", 'OUTLINER_OB_CURVES'),
+        base.Button("paint_plants", 'BRUSH_DATA'),
     )
-    draw_buttons(columns.column(), *IMPORTS)
+    base.draw_buttons(columns.column(), *IMPORTS)
 
 
-@menu("Layers")
+@base.menu("Layers")
 def TETFLORA_MT_layers(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
     """Less common operators for layers."""
     layer = active_layer(context.scene)
-    draw_buttons(
+    base.draw_buttons(
         layout,
-        Button("update_layers", 'FILE_REFRESH', "Update This Layer", {"which": 'ACTIVE'}),
-        Button("update_layers", 'LOOP_BACK', "Clear Erased Places", {"which": 'ACTIVE', "forget_erased": True}),
-        Button("ground_cover", 'OUTLINER_OB_CURVES'),
-        Button("ground_snow", 'FREEZE'),
+        base.Button("update_layers", 'FILE_REFRESH', "Update This Layer", {"which": 'ACTIVE'}),
+        base.Button("update_layers", 'LOOP_BACK', "Clear Erased Places", {"which": 'ACTIVE', "forget_erased": True}),
+        base.Button("ground_cover", 'OUTLINER_OB_CURVES'),
+        base.Button("ground_snow", 'FREEZE'),
         None,
-        Button("duplicate_layer", 'DUPLICATE'),
-        Button("duplicate_layer", 'MESH_GRID', "Copy to Selected Meshes", {"to_selected": True}),
-        Button("set_layer_ground", 'MESH_GRID'),
-        Button("move_layer", 'GROUP', "Group with Layer Above", {"direction": 'IN'}),
-        Button("move_layer", 'X', "Take Out of Group", {"direction": 'OUT'}),
-        Button("select_plants", 'RESTRICT_SELECT_OFF', "Select Plants of Layer", {"layer": True}),
-        Button("remove_layer", 'REMOVE', "Remove but Keep Plants", {"keep_plants": True}),
+        base.Button("duplicate_layer", 'DUPLICATE'),
+        base.Button("duplicate_layer", 'MESH_GRID', "Copy to Selected Meshes", {"to_selected": True}),
+        base.Button("set_layer_ground", 'MESH_GRID'),
+        base.Button("move_layer", 'GROUP', "Group with Layer Above", {"direction": 'IN'}),
+        base.Button("move_layer", 'X', "Take Out of Group", {"direction": 'OUT'}),
+        base.Button("select_plants", 'RESTRICT_SELECT_OFF', "Select Plants of Layer", {"layer": True}),
+        base.Button("remove_layer", 'REMOVE', "Remove but Keep Plants", {"keep_plants": True}),
         None,
-        Button("save_biome", 'FILE_TICK', "Save as Biome..."),
-        Button("import_biome", 'IMPORT', "Import Biome..."),
+        base.Button("save_biome", 'FILE_TICK', "Save as Biome..."),
+        base.Button("import_biome", 'IMPORT', "Import Biome..."),
     )
     if layer is None:
         return
     layout.separator()
     layout.prop(layer, "frozen")
     if layer.kind == SCATTER:
-        draw_properties(layout, layer, "seed", "tilt", "ground_collection")
+        base.draw_properties(layout, layer, "seed", "tilt", "ground_collection")
         layout.prop_menu_enum(layer, "as_field")
 
 
-@panel("Layers", "landscapes.md#layers")
+@base.panel("Layers", "landscapes.md#layers")
 def TETFLORA_PT_layers(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
     """Layers."""
     scene = context.scene
@@ -153,15 +140,15 @@ def TETFLORA_PT_layers(layout: bpy.types.UILayout, context: bpy.types.Context) -
     # Not a popover, which would stay after a click until another one beside it.
     added = column.operator("wm.call_panel", text="", icon='ADD')
     added.name, added.keep_open = TETFLORA_PT_add_layer.__name__, False
-    Button("remove_layer", 'REMOVE', "").draw(column)
+    base.Button("remove_layer", 'REMOVE', "").draw(column)
     column.separator()
     for direction in ('UP', 'DOWN'):
-        Button("move_layer", f"TRIA_{direction}", "", {"direction": direction}).draw(column)
+        base.Button("move_layer", f"TRIA_{direction}", "", {"direction": direction}).draw(column)
     column.menu(TETFLORA_MT_layers.__name__, text="", icon='DOWNARROW_HLT')
     row = layout.row(align=True)
     row.scale_y = 1.2
-    Button("update_layers", 'FILE_REFRESH').draw(row)
-    Button("update_layers", 'MOD_NOISE', "", {"which": 'ACTIVE', "reroll": True}).draw(row)
+    base.Button("update_layers", 'FILE_REFRESH').draw(row)
+    base.Button("update_layers", 'MOD_NOISE', "", {"which": 'ACTIVE', "reroll": True}).draw(row)
     row.prop(context.window_manager, "tetflora_points", text="", icon='PARTICLE_POINT')
     layout.label(text=_status(layer, len(group.layers) > 0), icon='INFO')
     if layer is None:
@@ -176,15 +163,15 @@ def TETFLORA_PT_layers(layout: bpy.types.UILayout, context: bpy.types.Context) -
         _draw_stand(column, layer.field)
     elif kind is GROUP:
         column.prop(layer, "gives_way")
-    if (layer.kind != FIELD or kind is STAND) and (body := section(column, "Where", closed=False)):
+    if (layer.kind != FIELD or kind is STAND) and (body := base.section(column, "Where", closed=False)):
         names = [entry.object.name for entry in owner.grounds[:2] if entry.object is not None]
         more = len(owner.grounds) - 2
-        draw_below(body, ", ".join(names) + (f" and {more:,} more" if more > 0 else "") or "None", "Ground")
-        draw_where(body, owner)
-    if layer.kind == SCATTER and (body := section(column, "Spacing and Size")):
+        base.draw_below(body, ", ".join(names) + (f" and {more:,} more" if more > 0 else "") or "None", "Ground")
+        base.draw_where(body, owner)
+    if layer.kind == SCATTER and (body := base.section(column, "Spacing and Size")):
         _draw_spacing(body, layer)
         for text in points.complaints(layer):
-            draw_message(context, body, text)
+            base.draw_message(context, body, text)
 
 
 def _status(layer: bpy.types.PropertyGroup | None, others: bool) -> str:
@@ -208,12 +195,12 @@ def _draw_scatter(layout: bpy.types.UILayout, layer: bpy.types.PropertyGroup) ->
     else:
         row.prop(layer, "count")
     row.prop(layer, "by_density", text="", icon='MESH_GRID')
-    draw_species(layout, layer, "mix")
+    base.draw_species(layout, layer, "mix")
     if entry := active_in(layer, "mix"):
         layout.prop(entry, "habitat")
         layout.prop(entry, "companion_choice")
         if entry.companion:
-            draw_properties(layout.column(align=True), entry, "companion_strength", "companion_distance")
+            base.draw_properties(layout.column(align=True), entry, "companion_strength", "companion_distance")
 
 
 def _draw_spacing(layout: bpy.types.UILayout, layer: bpy.types.PropertyGroup) -> None:
@@ -221,7 +208,7 @@ def _draw_spacing(layout: bpy.types.UILayout, layer: bpy.types.PropertyGroup) ->
     layout.prop(layer, "clumping")
     if layer.clumping:
         layout.prop(layer, "clump_size")
-    draw_numbers(layout, layer, "scale_range")
+    base.draw_numbers(layout, layer, "scale_range")
     column = layout.column(align=True)
     column.prop(layer, "age")
     if layer.age > 0.0:
@@ -230,11 +217,10 @@ def _draw_spacing(layout: bpy.types.UILayout, layer: bpy.types.PropertyGroup) ->
 
 def draw_distance(layout: bpy.types.UILayout, settings: bpy.types.PropertyGroup) -> None:
     """The switch between the distance that suits the species and the artist's own, and the one that counts."""
-    row = layout.row(heading="Min Distance")
-    row.prop(settings, "distance_by_species")
+    layout.row(heading="Min Distance").prop(settings, "distance_by_species")
     if follows_species(settings):
-        found = distance_to_draw(settings)
-        draw_below(layout, "…" if found is None else shown_length(found))
+        found = suggestion(settings, crown_to_draw)  # None for a moment, until the crowns of the species are known
+        base.draw_below(layout, "…" if found is None else base.shown_length(found))
     else:
         layout.prop(settings, "min_distance", text=" ")
 
@@ -247,13 +233,13 @@ def _draw_stand(layout: bpy.types.UILayout, field: bpy.types.Object) -> None:
         text = f"Year of {last:g}" if last else "Year"
         layout.prop(field.tetflora, "stand_year", text=text, slider=True)
         row = layout.row(align=True)
-        Button("animate_growth", 'KEYFRAME').draw(row)
-        Button("keep_year", 'PINNED').draw(row)
-    draw_properties(layout.column(), stand, "years", "density")
-    draw_species(layout, stand)
+        base.Button("animate_growth", 'KEYFRAME').draw(row)
+        base.Button("keep_year", 'PINNED').draw(row)
+    base.draw_properties(layout.column(), stand, "years", "density")
+    base.draw_species(layout, stand)
     if entry := active_in(stand, "species"):
         layout.prop(entry, "incoming_seeds")
-    if body := section(layout, "Site"):
-        draw_properties(body.column(align=True), stand, "recruits", "outside")
-        draw_properties(body.column(align=True), stand, "degree_days", "coldest_month")
-        draw_properties(body.column(align=True), stand, "moisture", "relief", "fertility")
+    if body := base.section(layout, "Site"):
+        base.draw_properties(body.column(align=True), stand, "recruits", "outside")
+        base.draw_properties(body.column(align=True), stand, "degree_days", "coldest_month")
+        base.draw_properties(body.column(align=True), stand, "moisture", "relief", "fertility")

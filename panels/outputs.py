@@ -44,8 +44,7 @@ def TETFLORA_PT_render(layout: bpy.types.UILayout, context: bpy.types.Context) -
 @panel("TetFlora Results", "rendering.md#output", tab="output", bl_options={'DEFAULT_CLOSED'})
 def TETFLORA_PT_output(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
     """What becomes of results."""
-    output = context.scene.tetflora.output
-    layout.column().prop(output, "results_in")
+    layout.column().prop(context.scene.tetflora.output, "results_in")
     for collection in plant_collections(context.scene):
         column = layout.column(heading=collection.name)
         column.prop(collection, "hide_viewport", text="Viewports", toggle=False, invert_checkbox=True)

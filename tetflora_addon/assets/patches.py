@@ -218,7 +218,6 @@ def patches_of(surface: AssetSurface) -> Patches:
             center[:, axis] += np.bincount(owner[run], corners[:, :, axis].mean(axis=1), len(size))
     center /= size[:, None]
     of = np.cumsum(new_island)[first[:-1]] - 1
-    whole = np.add.reduceat(area, start)[of]
     return Patches(
         triangle,
         first,
@@ -226,7 +225,7 @@ def patches_of(surface: AssetSurface) -> Patches:
         solid[first[:-1]],
         (np.add.reduceat(width, first[:-1]) / size).astype(np.float32),
         center,
-        whole.astype(np.float32),
+        np.add.reduceat(area, start)[of].astype(np.float32),
         np.bincount(of)[of].astype(np.int32),
     )
 
@@ -296,8 +295,7 @@ def _along_a_curve(
         value = (value | value << 8) & 0x0300F00F
         value = (value | value << 4) & 0x030C30C3
         code |= ((value | value << 2) & 0x09249249) << axis
-    order = np.lexsort([face, code, owner])
-    return at, at[order]
+    return at, at[np.lexsort([face, code, owner])]
 
 
 #: Triangles up to which a cluster has no children.
@@ -379,13 +377,11 @@ def _divided(
     sorted_ = np.argsort(2 * owner + np.clip(place, 0.0, 1.0), kind="stable")
     order = order.copy()
     order[at] = patch[sorted_]
-    done = np.cumsum(weight[sorted_])
-    before = done - weight[sorted_] - (np.cumsum(load) - load)[owner]
+    before = np.cumsum(weight[sorted_]) - weight[sorted_] - (np.cumsum(load) - load)[owner]
     half = np.bincount(owner, before < load[owner] / 2, len(low)).astype(np.int64)
     half = np.clip(half, 1, np.maximum(size - 1, 1))
     middle = low + half
-    times = 1 + dividing
-    runs = np.repeat(np.arange(len(low)), times)
+    runs = np.repeat(np.arange(len(low)), 1 + dividing)
     second = np.diff(runs, prepend=-1) == 0
     new_low = np.where(second, middle[runs], low[runs])
     new_high = np.where(~second & dividing[runs], middle[runs], high[runs])

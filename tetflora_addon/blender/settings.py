@@ -391,6 +391,5 @@ def begin(scene: bpy.types.Scene) -> None:
     group, chosen = scene.tetflora, preferences()
     if chosen is None:
         return
-    values = QUALITIES[chosen.new_quality]
-    if not any(group.is_property_set(name) for name in values):
+    if not any(group.is_property_set(name) for name in QUALITIES[chosen.new_quality]):
         set_quality(group, list(QUALITIES).index(chosen.new_quality))

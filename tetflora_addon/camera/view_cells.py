@@ -111,7 +111,6 @@ def cell_camera(camera: Camera, cells: ViewCells, around: Around | None = None) 
     ----------
     camera : Camera
         As it was read, without margins. Its shutter and other eyes should stay in the cell or next to it, see `BEYOND`.
-    cells : ViewCells
     around : Around, optional
         Where things are; cells far from all of them are larger. None for the same cells everywhere.
 

@@ -343,8 +343,7 @@ class ShapedTotals:
         square = 1 + (crown[:, crown_effects.LIGHT][:, :2] ** 2).sum(axis=1) / 2
         width = crown[:, WIDTH]
         factors = np.stack([np.ones(len(row)), width, width**2 * square], axis=1)[:, :, None]
-        plain = self.power[row, 0]
-        return (factors * power).sum(axis=1), (np.ones((1, 3, 1)) * plain).sum(axis=1)
+        return (factors * power).sum(axis=1), (np.ones((1, 3, 1)) * self.power[row, 0]).sum(axis=1)
 
 
 def _over(own: Floats, plain: Floats) -> Floats:
@@ -575,8 +574,6 @@ def totals_of_day(
     Parameters
     ----------
     rows : (r,) parameter table
-    species : sequence of Species
-    season : seasons.Season
     totals : Averages
         Of the same rows.
     leaf : RowLeaves

@@ -137,8 +137,7 @@ def path_lengths(origin: Floats, direction: Floats, shape: Integers) -> tuple[In
     part = np.flatnonzero((ray[1:] == ray[:-1]) & (at[1:] > at[:-1]))
     ray, length, middle = ray[part], at[part + 1] - at[part], (at[part] + at[part + 1]) / 2
     points = [np.take(origin[:, k], ray) + steep[k] * middle for k in range(3)]
-    cell = cell_numbers(points, shape)
-    return inside[ray], cell, length
+    return inside[ray], cell_numbers(points, shape), length
 
 
 _SKY = np.array([0.0, 0.0, 1.0])
@@ -265,7 +264,6 @@ def elements_of(
 
     Parameters
     ----------
-    rows : parameter table
     forms : by kind
         Models of leaves of the species.
     subplants : Branches of one species

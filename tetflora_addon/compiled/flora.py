@@ -379,7 +379,6 @@ def placed_samples(
 
     Parameters
     ----------
-    flora : Flora
     points : Points
         Leaves or wood of its samples.
     subplants : Branches of n

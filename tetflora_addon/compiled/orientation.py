@@ -234,8 +234,7 @@ def _skies_met(rows: Table, length: Floats) -> list[Floats]:
             some = np.concatenate(met[i])
             sky = some[thinned(len(some), _MET)]
         else:  # a trunk
-            key = key_of_seed(np.arange(_MET))
-            tilt = ranged(rows, "angle", np.full(_MET, i), key, Draw.ANGLE)
+            tilt = ranged(rows, "angle", np.full(_MET, i), key_of_seed(np.arange(_MET)), Draw.ANGLE)
             sky = np.stack([-np.sin(tilt), np.zeros(_MET), np.cos(tilt)], axis=1)
         out.append(sky)
         if (rows["next"][i] >= 0).any() or rows["phantom"][i]:

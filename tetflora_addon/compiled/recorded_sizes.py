@@ -86,8 +86,7 @@ class Sizes(Arrays):
 
 def heights(species: Species, years: Floats) -> Floats:
     """Heights (n,) at ages (n,), over that at the full age."""
-    known = _heights(ages_of(species))
-    return np.interp(np.log(np.maximum(years, 1e-3)), *known)
+    return np.interp(np.log(np.maximum(years, 1e-3)), *_heights(ages_of(species)))
 
 
 def ages_of_heights(species: Species, ratio: Floats) -> Floats:

@@ -381,7 +381,6 @@ def limbs_of(
 
     Parameters
     ----------
-    rows : parameter table
     first, i : int
         First row of the species, and the row that is sampled, counted from there.
     number : (k, s) int

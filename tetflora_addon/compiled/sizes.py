@@ -256,7 +256,6 @@ def fitted(flora: Flora, seeds: Seeds, height: Floats, width: Floats, times: int
 
     Parameters
     ----------
-    flora : Flora
     seeds : Seeds of n
     height, width : (n,) float64
         Meters.
@@ -274,8 +273,7 @@ def fitted(flora: Flora, seeds: Seeds, height: Floats, width: Floats, times: int
     def work(some: Integers) -> None:
         own, wanted, factor = seeds.take(some), width[some] / height[some], np.ones(len(some))
         crown = np.tile(PLAIN, (len(own), 1)) if own.crown is None else own.crown
-        row = flora.first_row[own.species]
-        most = np.where(are_stools(flora.rows, row), MOST_LEANING, MOST[WIDTH])
+        most = np.where(are_stools(flora.rows, flora.first_row[own.species]), MOST_LEANING, MOST[WIDTH])
         tall, left = np.ones(len(own)), np.arange(len(own))
         for _ in range(times):
             shaped = crown[left]
@@ -299,8 +297,7 @@ def fitted(flora: Flora, seeds: Seeds, height: Floats, width: Floats, times: int
 def _by_kind(flora: Flora, seeds: Seeds, work: Callable[[Integers], None]) -> None:
     """Do some work on some plants (k,) at a time, each kind apart, as kinds have more or fewer limbs."""
     order = np.argsort(seeds.species, kind="stable")
-    ends = np.flatnonzero(np.diff(seeds.species[order])) + 1
-    kinds = np.split(order, ends)
+    kinds = np.split(order, np.flatnonzero(np.diff(seeds.species[order])) + 1)
     for some in kinds:
         if len(some):
             _beyond(flora.in_leaf, int(seeds.species[some[0]]))

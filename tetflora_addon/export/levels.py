@@ -78,7 +78,6 @@ def levels_of(flora: Flora, seed: Seeds, number: int = 0, like: tuple[PlantLevel
 
     Parameters
     ----------
-    flora : Flora
     seed : Seeds of 1
     number : int
         Levels, with the full one; 0 for as many as suit the plant, three to six.
@@ -355,8 +354,7 @@ def _least(parts: Sequence[Floats32]) -> Floats32:
 
 def corner_triangles(mesh: MeshBuffers) -> tuple[Integers, Integers]:
     """Faces (t,) of the triangles that fan out over those of a mesh, and the corners (t, 3) of these."""
-    size = np.diff(mesh.face_offsets)
-    owner, index = spread(np.maximum(size - 2, 0).astype(np.int64))
+    owner, index = spread(np.maximum(np.diff(mesh.face_offsets) - 2, 0).astype(np.int64))
     first = mesh.face_offsets[owner]
     return owner, np.stack([first, first + index + 1, first + index + 2], axis=1)
 

@@ -24,7 +24,13 @@ def write_obj(path: Path, forest: Forest) -> Iterator[float]:
     OSError
         One of them cannot be written.
     """
-    _write_materials(path.with_suffix(".mtl"), forest)
+    lines = []
+    for surface in forest.surfaces:
+        color = " ".join(f"{x:.4f}" for x in surface.color)
+        lines += [f"newmtl {surface.name}", f"Kd {color}", "Ks 0 0 0", f"Pr {surface.roughness:.3f}"]
+        named = (("map_Kd", "color"), ("norm", "normal"), ("map_Pr", "roughness"), ("map_d", "card"))
+        lines += [f"{key} {surface.textures[name]}" for key, name in named if name in surface.textures]
+    path.with_suffix(".mtl").write_text("\n".join(lines) + "\n", encoding="utf-8")
     vertices = corners = 0
     with path.open("w", encoding="utf-8") as file:
         file.write(f"mtllib {path.with_suffix('.mtl').name}\n")
@@ -59,13 +65,3 @@ def _write_mesh(file: TextIO, mesh: MeshBuffers, vertex: int, corner: int) -> No
         index = first[:, None] + np.arange(number)
         both = np.stack([mesh.corner_verts[index] + vertex, index + corner], axis=2).reshape(len(index), -1)
         np.savetxt(file, both, "f" + " %d/%d" * number)
-
-
-def _write_materials(path: Path, forest: Forest) -> None:
-    lines = []
-    for surface in forest.surfaces:
-        color = " ".join(f"{x:.4f}" for x in surface.color)
-        lines += [f"newmtl {surface.name}", f"Kd {color}", "Ks 0 0 0", f"Pr {surface.roughness:.3f}"]
-        named = (("map_Kd", "color"), ("norm", "normal"), ("map_Pr", "roughness"), ("map_d", "card"))
-        lines += [f"{key} {surface.textures[name]}" for key, name in named if name in surface.textures]
-    path.write_text("\n".join(lines) + "\n", encoding="utf-8")

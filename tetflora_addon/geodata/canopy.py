@@ -8,7 +8,7 @@ Sensing 70 (5), 2004: crown width over height of mixed stands. Crowns are waters
 highest neighbor, and from a summit that is no top to the top that hides it. Nothing loops over cells or trees.
 """
 
-from collections.abc import Generator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from ..arrays import Floats, Floats32, Integers, Mask
 from ..arrays import top as top_of
 from ..errors import SceneError
-from ..jobs import Progress
+from ..jobs import Job, Progress
 from .projection import between
 from .rasters import Raster
 
@@ -117,7 +117,7 @@ def without_areas(raster: Raster, areas: Sequence[Floats]) -> tuple[Raster, int]
     return replace(raster, values=values), int((inside & np.isfinite(raster.values)).sum())
 
 
-def find_trees(values: Floats32, cell: float, least: float) -> Generator[Progress, object, Trees]:
+def find_trees(values: Floats32, cell: float, least: float) -> Job[Trees]:
     """Find trees; yields progress.
 
     Parameters
@@ -169,7 +169,7 @@ def _window(height: NDArray[np.floating]) -> NDArray[np.floating]:
     return np.minimum((WINDOW[0] + WINDOW[1] * height**2) / 2.0, _MOST_WINDOW)
 
 
-def _hidden_by(flat: Floats32, summits: Integers, stride: int, cell: float) -> Generator[Progress, object, Integers]:
+def _hidden_by(flat: Floats32, summits: Integers, stride: int, cell: float) -> Job[Integers]:
     """For each summit the cell that is highest in its window: itself if it is a top."""
     radius = _window(flat[summits].astype(np.float64)) / cell
     order = np.argsort(-radius, kind="stable")

@@ -12,7 +12,7 @@ import math
 import re
 import struct
 import zlib
-from collections.abc import Callable, Generator
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from ..arrays import Floats, Integers, Mask, spread, top
 from ..errors import SceneError, quoted
-from ..jobs import Progress
+from ..jobs import Job, Progress
 from . import table
 from .projection import Definition, Ellipsoid, System, described, known_systems, system_in, utm_zone
 from .rasters import Raster, check_regular, checked_size, system_beside, without_nodata, world_file
@@ -46,7 +46,7 @@ _OWN, _UTM_ZONES = 32767, 16000  # "user-defined"; and 16100 in the south
 _PALETTE = 3
 
 
-def read_tiff(path: Path) -> Generator[Progress, object, Raster]:
+def read_tiff(path: Path) -> Job[Raster]:
     """Read a GeoTIFF, or a TIFF with a world file; yields progress.
 
     Raises
@@ -177,7 +177,7 @@ class _Tags:
         """The error of a tag."""
         return SceneError(f"{self.name}: tag {tag} ({_NUMBERS[tag]}) {text}")
 
-    def pixels(self) -> Generator[Progress, object, tuple[NDArray[Any], Mask]]:
+    def pixels(self) -> Job[tuple[NDArray[Any], Mask]]:
         """Values (h, w) of the first sample, and which pixels are not in the file, (h, w); yields progress."""
         width, height = self.one("ImageWidth"), self.one("ImageLength")
         checked_size(width, height, f"{self.name}: ")
@@ -247,7 +247,7 @@ class _Tags:
             )
         return np.dtype(f"{self.order}{letter}{bits // 8}")
 
-    def mask(self, shape: tuple[int, int]) -> Generator[Progress, object, Mask]:
+    def mask(self, shape: tuple[int, int]) -> Job[Mask]:
         """Which pixels count, (h, w), by a mask that is another image of the file; yields progress."""
         own, seen = self.found, set()
         try:

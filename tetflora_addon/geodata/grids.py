@@ -5,7 +5,7 @@ several tiles as one.
 """
 
 import re
-from collections.abc import Generator, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -14,7 +14,7 @@ import numpy as np
 from ..arrays import Floats
 from ..errors import SceneError
 from ..files import read_whole
-from ..jobs import Progress
+from ..jobs import Job, Progress
 from .geotiff import read_tiff
 from .projection import LONGITUDE_LATITUDE, System
 from .rasters import MAX_TEXT, Raster, checked_size, numbers_in, read_ascii, system_beside, upright, without_nodata
@@ -26,7 +26,7 @@ _EVEN = 0.05  # of a step, by which places of a list may be off
 _RECORD, _FIRST, _LATER, _VALUE = 1024, 146, 170, 6  # of a USGS model: bytes, values in records, bytes of a value
 
 
-def read_grid(path: Path) -> Generator[Progress, object, Raster]:
+def read_grid(path: Path) -> Job[Raster]:
     """Read a raster of any of `ENDINGS` by what it holds; yields progress.
 
     Raises
@@ -73,7 +73,7 @@ def _hgt(path: Path) -> Raster:
     return Raster(without_nodata(values, _VOID), corner, *upright(step, step), System(LONGITUDE_LATITUDE))
 
 
-def _xyz(path: Path) -> Generator[Progress, object, Raster]:
+def _xyz(path: Path) -> Job[Raster]:
     """Lines of x, y and height, in any order."""
     name, content = path.name, read_whole(path, MAX_TEXT)
     head = content[: content.find(b"\n") + 1 or len(content)]

@@ -353,8 +353,7 @@ class _Reading:
         self.notes, self.first, self.left_out = list(table_.notes), table_.first, Counter()
         self.found: dict[str, list[tuple[str, Title]]] = {}
         self.used: dict[str, str] = {}
-        taken = taken_for(table_, chosen)
-        for title, what in sorted(taken.items(), key=lambda pair: pair[1].doubt):
+        for title, what in sorted(taken_for(table_, chosen).items(), key=lambda pair: pair[1].doubt):
             if what.field:
                 self.found.setdefault(what.field, []).append((title, what))
 

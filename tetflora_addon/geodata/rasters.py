@@ -4,7 +4,6 @@
 
 import re
 import warnings
-from collections.abc import Generator
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -16,7 +15,7 @@ from numpy.typing import NDArray
 from ..arrays import Floats, Floats32
 from ..errors import SceneError, quoted
 from ..files import is_regular, read_whole
-from ..jobs import Progress
+from ..jobs import Job, Progress
 from .projection import LONGITUDE_LATITUDE, System, may_be_degrees, system_in
 
 #: Most cells of a raster, and bytes of a text file of them.
@@ -161,7 +160,7 @@ def checked_size(width: int, height: int, what: str) -> None:
         )
 
 
-def read_ascii(path: Path) -> Generator[Progress, object, Raster]:
+def read_ascii(path: Path) -> Job[Raster]:
     """Read an ASCII grid (Esri); yields progress. A file ``.prj`` beside it may name its coordinate system.
 
     Raises
@@ -205,8 +204,7 @@ def read_ascii(path: Path) -> Generator[Progress, object, Raster]:
         done, start, line = done + len(found), end, line + piece.count(b"\n")
     if done < len(values):
         raise SceneError(f"{name}: line {line}: it ends after {done:,} of {len(values):,} values; get it again")
-    nothing = header.get("nodata_value", -9999.0)
-    values = without_nodata(values.reshape(height, width), nothing)
+    values = without_nodata(values.reshape(height, width), header.get("nodata_value", -9999.0))
     first = np.array([corner[0], corner[1] + (height - 1) * dy])
     return Raster(values, first, *upright(dx, dy), system_beside(path))
 

@@ -32,7 +32,6 @@ def shaped_trunks(rows: Table, row: Integers, frame: Floats, forms: Floats) -> t
 
     Parameters
     ----------
-    rows : parameter table
     row : (n,) int
     frame : (n, 3, 3) float64
         Of the trunks.
@@ -143,9 +142,7 @@ def handed_on(rows: Table, parent: Branches, sort: int, length: ArrayLike, azimu
 
     Parameters
     ----------
-    rows : parameter table
     parent : Branches of m
-    sort : int
     length : (m,) float64
         Factors on the lengths of the children.
     azimuth, angle : (m,) float64

@@ -78,7 +78,6 @@ def leaf_sites(
 
     Parameters
     ----------
-    rows : parameter table
     branches, lines : Branches of n and their Axes
     row : (m,) or (1,) int
     owner : (m,) int
@@ -107,17 +106,6 @@ def leaf_sites(
     return position, frame, at
 
 
-def inclinations(kind: Integers, number: Floats) -> Floats:
-    """Angles (m,) between normals and axis, 0 to π/2, from even random numbers (m,), of kinds (m,) or (1,)."""
-    out = np.arccos(1.0 - number)  # of a sphere
-    for name, (a, b) in _COSINES.items():
-        own = kind == LEAF_INCLINATIONS.index(name)
-        if own.any():
-            below = (2.0 * _TABLE + a * np.sin(2.0 * _TABLE) + 0.5 * b * np.sin(4.0 * _TABLE)) / np.pi
-            out = np.where(own, np.interp(number, below, _TABLE), out)
-    return out
-
-
 def inclined(frame: Floats32, kind: Integers, key: Keys) -> Floats32:
     """Frames (m, 3, 3) of leaves that stand by a distribution, all around their branch and turned in their own plane.
 
@@ -129,7 +117,13 @@ def inclined(frame: Floats32, kind: Integers, key: Keys) -> Floats32:
         Index into `LEAF_INCLINATIONS`.
     key : (m,) uint64
     """
-    angle = inclinations(kind, uniform(key, Draw.LEAF_INCLINATION))
+    number = uniform(key, Draw.LEAF_INCLINATION)
+    angle = np.arccos(1.0 - number)  # of a sphere
+    for name, (a, b) in _COSINES.items():
+        own = kind == LEAF_INCLINATIONS.index(name)
+        if own.any():
+            below = (2.0 * _TABLE + a * np.sin(2.0 * _TABLE) + 0.5 * b * np.sin(4.0 * _TABLE)) / np.pi
+            angle = np.where(own, np.interp(number, below, _TABLE), angle)
     angle = np.where(uniform(key, Draw.LEAF_SIDE) < 0.5, angle, np.pi - angle)
     bearing, twist = (2.0 * np.pi * uniform(key, draw) for draw in (Draw.LEAF_BEARING, Draw.LEAF_TWIST))
     sa, ca, sb, cb, st, ct = (f(v).astype(np.float32) for v in (angle, bearing, twist) for f in (np.sin, np.cos))
@@ -254,7 +248,6 @@ def place_leaves(
 
     Parameters
     ----------
-    rows : parameter table
     branches, lines : Branches of n and their Axes
         Fastest where all are of one row, because parameters are then the same for all.
     owner, index : (m,) int
@@ -296,7 +289,6 @@ def leaf_frames(
 
     Parameters
     ----------
-    rows : parameter table
     row : (m,) or (1,) int
     frame : (m, 3, 3) float32
         Of the branch where each leaf sits.
@@ -382,7 +374,6 @@ def settled(rows: Table, row: Integers, frame: NDArray[np.floating], light: Floa
 
     Parameters
     ----------
-    rows : parameter table
     row : (n,) or (1,) int
     frame, light, sky
         As for `face_light`.

@@ -210,7 +210,6 @@ def chosen_children(
 
     Parameters
     ----------
-    rows : parameter table
     parents : Branches of n
     lines : Axes of the same n
     owner : (m,) int
@@ -302,8 +301,7 @@ def chosen_children(
     else:
         vigor, measure = np.ones(len(index)), parent.scale
     length = measure * ranged(rows, "length", row, key, Draw.LENGTH)
-    thickness = ranged(rows, "thickness", row, key, Draw.THICKNESS)
-    radius = (length if sort == SPUR else radius) * thickness
+    radius = (length if sort == SPUR else radius) * ranged(rows, "thickness", row, key, Draw.THICKNESS)
     later = None
     if lines.later is not None:
         again = chosen_children(rows, parents.moved(), lines.later, owner, index, counts, sort)

@@ -62,7 +62,6 @@ def grow_children(
     ----------
     row : record of `rows.ROW_DTYPE`
         Its count is that of the whole axis, of which it is one part.
-    sort : int
     nodes : Nodes
         Of the whole axis.
     start : pair of float
@@ -247,7 +246,6 @@ def grown_nodes(
 
     Parameters
     ----------
-    rows : parameter table
     branches : Branches of n
     sort, path : int
         Of children, and where their child indices begin.

@@ -159,7 +159,6 @@ def plant_years(rows: Table, row: Integers, key: Keys) -> Floats | None:
 
     Parameters
     ----------
-    rows : parameter table
     row : (n,) int
         Of their trunks.
     key : (n,) uint64
@@ -314,14 +313,6 @@ def mean_autumn_colors(year: Table, hue: Floats) -> Floats:
     return np.einsum("nk,nkc->nc", share, year["autumn"])
 
 
-def in_season(summer: Floats, fresh: Floats, stages: Stages, autumn: Floats, dry: Floats) -> Floats:
-    """Colors (n, 3) of leaves at their stages, from those that they have when they are at the end of each."""
-    out = summer + stages.fresh[:, None] * (fresh - summer)
-    out += stages.turned[:, None] * (autumn - out)
-    out += stages.dead[:, None] * (dry - out)
-    return out
-
-
 def is_gone(species: Species, season: Season | None) -> bool:
     """Whether no plant of a species is there in a season, because its leaves have not fallen yet or are rotten.
 
@@ -373,7 +364,9 @@ def leaf_colors_at(
     year = rows["year"][row]
     uneven = 1.0 + _UNEVEN * np.reshape(deviation, (-1, 1))
     autumn = autumn_colors(year, hue, stages.tint) * uneven
-    colors = in_season(summer, year["fresh"], stages, autumn, year["dry"] * uneven)
+    colors = summer + stages.fresh[:, None] * (year["fresh"] - summer)
+    colors += stages.turned[:, None] * (autumn - colors)
+    colors += stages.dead[:, None] * ((year["dry"] * uneven) - colors)
     return np.clip(colors, 0, 1, out=colors)
 
 

@@ -135,8 +135,7 @@ class LeafModel:
 
         Faces of cones and fruit hide each other; those of leaves count in full.
         """
-        spread = np.linalg.eigvalsh(self.moment)
-        if spread[1] < _FLAT_LEAF:
+        if np.linalg.eigvalsh(self.moment)[1] < _FLAT_LEAF:
             return self.area
         shown = 2.0 * mean_silhouette(self)
         return shown if shown < _SOLID * self.area else self.area
@@ -302,7 +301,6 @@ def rounded(model: LeafModel, times: int) -> tuple[LeafModel, float]:
 
     Parameters
     ----------
-    model : LeafModel
     times : int
         Each makes four faces of a triangle.
 
@@ -424,8 +422,6 @@ def spined(model: LeafModel, spines: Spines, part: Integers) -> tuple[LeafModel,
 
     Parameters
     ----------
-    model : LeafModel
-    spines : Spines
     part : (f,) int64
         Its `bodies.closed_parts`, on which spines stand.
 

@@ -89,7 +89,8 @@ class Blade:
                 )
             elif self.tooth != "serrate":
                 within = np.arange(4) / 4
-            found.append(self._parameter(((steps + within) / self.teeth).ravel()))
+            y = ((steps + within) / self.teeth).ravel()
+            found.append(y if self.palmate else np.arccos(np.clip(1.0 - 2.0 * y, -1.0, 1.0)) / np.pi)
         if self.palmate and self.lobes:
             tips, _ = self._palm()
             angle = np.concatenate([tips, (tips[1:] + tips[:-1]) / 2])
@@ -124,10 +125,6 @@ class Blade:
     def _height(self, s: Floats) -> Floats:
         """Heights (n,) of unlobed margins; close together at both ends, where they may be round."""
         return (1.0 - np.cos(np.pi * s)) / 2.0
-
-    def _parameter(self, y: Floats) -> Floats:
-        """Parameters of fractions y (n,) of the way along the margin, at which teeth stand in even distances."""
-        return y if self.palmate else np.arccos(np.clip(1.0 - 2.0 * y, -1.0, 1.0)) / np.pi
 
     def _along(self, s: Floats) -> Floats:
         return s if self.palmate else self._height(s)

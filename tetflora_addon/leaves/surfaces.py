@@ -339,7 +339,6 @@ def blade_surface(blade: Blade, tolerance: float, amount: float = 1.0) -> LeafSu
 
     Parameters
     ----------
-    blade : Blade
     tolerance : float
         Of the outline, in lengths of the blade.
     amount : float
@@ -429,8 +428,7 @@ def _strip(inner: Floats, outer: Floats, first: int, second: int) -> Integers:
         return np.stack([first + i, second + i, second + i + 1, first + i + 1], axis=1)
     middle = np.concatenate([(inner[1:] + inner[:-1]) / 2, (outer[1:] + outer[:-1]) / 2])
     inside = np.arange(len(middle)) < len(inner) - 1
-    order = np.argsort(middle, kind="stable")
-    inside = inside[order]
+    inside = inside[np.argsort(middle, kind="stable")]
     a, b = np.cumsum(inside) - inside, np.cumsum(~inside) - ~inside  # links of either line that are done
     a, b = first + a, second + b
     return np.stack([a, b, np.where(inside, a + 1, b + 1), np.where(inside, a + 1, b + 1)], axis=1)
@@ -525,8 +523,7 @@ def _leaflets(compound: Compound) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Places on the rachis, angles to it and lengths (n,) of leaflets."""
     if compound.around:
         n = compound.around
-        whole = np.radians(compound.circle)
-        turn = whole * ((np.arange(n) + 0.5) / n - 0.5)
+        turn = np.radians(compound.circle) * ((np.arange(n) + 0.5) / n - 0.5)
         return np.full(n, compound.first), turn, np.full(n, compound.length)
     rank = np.linspace(0.0, 1.0, max(compound.pairs, 1))
     below, above = rank / max(compound.longest, 1e-6), (1.0 - rank) / max(1.0 - compound.longest, 1e-6)

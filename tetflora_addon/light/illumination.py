@@ -328,7 +328,6 @@ def shadow_steps(
     ----------
     clouds : MediumCells
         All tetrahedra that hold something.
-    sources : Sources
     resolution : int
         Longer side of a lamp's buffer, pixels; see `light_resolution`. The sky's are `SKY_FRACTION` of it.
     sheets : SurfaceElements, optional

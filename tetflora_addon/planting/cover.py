@@ -197,7 +197,6 @@ class Floor:
 
         Parameters
         ----------
-        habitat : Habitat
         species : int or None
             What sheds it; anything if None, nothing that stands if -1.
         seed : int

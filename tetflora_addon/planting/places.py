@@ -164,8 +164,6 @@ def place(
 
     Parameters
     ----------
-    ground : Terrain
-    rules : Rules
     older : (m, 2) or (m, 3) float64, optional
         Places of plants that stand already, meters; new ones keep their distance from them, and may seek or shun them.
     older_species : (m,) int32, optional

@@ -240,8 +240,7 @@ class Spacing:
         for step in _NEAR:
             wanted = cells_of(speakers, self.cell, step)
             place = np.minimum(np.searchsorted(cells, wanted), len(cells) - 1)
-            other = order[place]
-            outranked |= (cells[place] == wanted) & (other < np.arange(len(speakers)))
+            outranked |= (cells[place] == wanted) & (order[place] < np.arange(len(speakers)))
         return outranked
 
 

@@ -102,7 +102,6 @@ def paint(brush: Brush, center: Sequence[float], standing: Floats, key: Keys, da
 
     Parameters
     ----------
-    brush : Brush
     center : sequence of float
         Middle of the circle; what is beyond x and y does not count.
     standing : (m, 2) or (m, 3) float64

@@ -183,7 +183,6 @@ def colors_of(level: Level, mode: str, deepest: int) -> Floats32:
 
     Parameters
     ----------
-    level : Level
     mode : {'LEVEL', 'VISIBILITY', 'FORM', 'CONTRIBUTION'}
         By how often space was divided, by visibility, by what was decided, or by the logarithm of the pixels that are
         changed.

@@ -92,8 +92,7 @@ def light_plants(flora: Flora, seeds: Seeds, most: int = MOST_FACES) -> Shapes:
     if len(seeds) > most:
         return crowns_of(flora, seeds)
     of, origin, trunk = _shown(flora, seeds, most)
-    species = flora.rows["species"][trunk.row]
-    low, high, *radii = _profiles(flora)[species].T
+    low, high, *radii = _profiles(flora)[flora.rows["species"][trunk.row]].T
     length, low, wider, light = outlines(flora, trunk, low, high)
     leaves, left, wood = _looks(flora, trunk)
     heights = length[:, None] * np.column_stack([low, high])

@@ -59,7 +59,6 @@ def shown(plants: InView, areas: Floats, most: int = MOST) -> Seeds:
 
     Parameters
     ----------
-    plants : InView
     areas : (n,) float64
         Of their crowns from the side, m².
     most : int

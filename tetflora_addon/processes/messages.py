@@ -115,8 +115,7 @@ def receive(stream: BinaryIO, things: Mapping[int, object] | None = None) -> lis
         raise Closed
     (number,) = _numbers(stream, 1)
     counts = _numbers(stream, number)
-    sizes = _numbers(stream, sum(counts))
-    parts = iter([_read(stream, size) for size in sizes])
+    parts = iter([_read(stream, size) for size in _numbers(stream, sum(counts))])
     found = []
     for count in counts:
         data, *arrays = (next(parts) for _ in range(count))

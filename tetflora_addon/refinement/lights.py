@@ -74,7 +74,6 @@ def light_views(light: Light, vertices: Floats, points: Floats, resolution: int)
 
     Parameters
     ----------
-    light : Light
     vertices : (n, 4, 3) float64
         Tetrahedra that stand in the light, meters.
     points : (m, 3) float64
@@ -122,8 +121,7 @@ def image_size(width: float, height: float) -> tuple[int, int]:
 def frame_toward(direction: Floats) -> Floats:
     """Frame (3, 3) of a camera that looks in a direction (3,) of any length."""
     back = -np.asarray(direction, np.float64) / np.linalg.norm(direction)
-    aside = np.eye(3)[np.argmin(np.abs(back))]
-    right = np.cross(aside, back)
+    right = np.cross(np.eye(3)[np.argmin(np.abs(back))], back)
     right /= np.linalg.norm(right)
     return np.stack([right, np.cross(back, right), back], axis=1)
 
@@ -131,8 +129,7 @@ def frame_toward(direction: Floats) -> Floats:
 def lamp_views(position: Floats, points: Floats, resolution: int) -> list[Camera]:
     """Views of points (m, 3) from a lamp: one that fits them closely, or six all around where they surround it."""
     away = points - position
-    distance = np.linalg.norm(away, axis=1)
-    far = float(distance.max(initial=0.0)) + 1.0
+    far = float(np.linalg.norm(away, axis=1).max(initial=0.0)) + 1.0
     middle = (points.min(axis=0) + points.max(axis=0)) / 2.0 - position
     frame = frame_toward(middle if np.linalg.norm(middle) > _NEAR else np.array([0.0, 0.0, -1.0]))
     local = away @ frame

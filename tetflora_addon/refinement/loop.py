@@ -182,7 +182,11 @@ def outliers_of(
         center, reach = np.concatenate([center, own.center]), np.append(reach, own.reach)
         assets_end += len(placed)
     if polygons is not None and len(polygons):
-        others = _around_instances(polygons)
+        number = len(polygons.meshes.surface)
+        low, high = np.full((number, 3), np.inf), np.full((number, 3), -np.inf)
+        np.minimum.at(low, polygons.instance, polygons.center - polygons.reach[:, None])
+        np.maximum.at(high, polygons.instance, polygons.center + polygons.reach[:, None])
+        others = (low + high) / 2.0, np.linalg.norm(high - low, axis=1) / 2.0
         center, reach = np.concatenate([center, others[0]]), np.append(reach, others[1])
     away = np.linalg.norm(center - camera.eye, axis=1)
     some = far_off(away - reach)
@@ -214,15 +218,6 @@ def _unseen(camera: Camera, center: Floats, reach: Floats, away: Floats) -> Mask
     depth = away if camera.kind == "PANO" else camera.to_camera_space(center)[:, 2]
     out = (depth - reach > camera.far) | (depth + reach < camera.near) | (camera.distance_to_view(center) > reach)
     return specks | (out & (GAP * reach < away))
-
-
-def _around_instances(polygons: Polygons) -> tuple[Floats, Floats]:
-    """Middles (i, 3) of all instances of meshes, and how far they reach from there (i,), meters."""
-    number = len(polygons.meshes.surface)
-    low, high = np.full((number, 3), np.inf), np.full((number, 3), -np.inf)
-    np.minimum.at(low, polygons.instance, polygons.center - polygons.reach[:, None])
-    np.maximum.at(high, polygons.instance, polygons.center + polygons.reach[:, None])
-    return (low + high) / 2.0, np.linalg.norm(high - low, axis=1) / 2.0
 
 
 #: Bisections between two visibility steps; three together divide a tetrahedron into eight parts.
@@ -313,8 +308,6 @@ def refine(
         Compiled species, in the order of ``seeds.identifiers``.
     seeds : Seeds
         At least one plant, or none where there are polygons or assets.
-    camera : Camera
-    settings : RefinementSettings
     occluders : (t, 3, 3) float64, optional
         Triangles of explicit polygons that hide what is behind them, meters.
     polygons : Polygons, optional

@@ -69,7 +69,6 @@ def tetrahedron_fragments(vertices: Floats, camera: Camera, width: int, height: 
     ----------
     vertices : (n, 4, 3) float64
         Positively oriented tetrahedra, meters, world space. They may hold the eye or cross its plane.
-    camera : Camera
     width, height : int
         Size of the small image, pixels.
 
@@ -117,8 +116,7 @@ def _fragments(vertices: Floats, camera: Camera, width: int, height: int) -> Fra
     box = _pixel_box(low, high, camera, width, height)
     # Camera space is mirrored (depth is −z), so outward normals of positive tetrahedra point inwards there.
     inward = face_area_vectors(local)
-    on_face = local[:, [1, 0, 0, 0]]
-    offset = -np.sum(inward * on_face, axis=2)
+    offset = -np.sum(inward * local[:, [1, 0, 0, 0]], axis=2)
     # Inside where offset + x · normal_x + y · normal_y + depth · normal_z >= 0, or all but offset times depth.
     parallel = camera.kind == "ORTHO"
     divisor, constant = (inward[..., 2], offset) if parallel else (offset, inward[..., 2])

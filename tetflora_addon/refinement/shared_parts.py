@@ -181,7 +181,6 @@ class SharedParts(Generic[Parts]):
 
         Parameters
         ----------
-        tree : TetrahedralTree
         dividing : (nodes,) bool
             Nodes that have been divided.
         edge : (nodes,) float64
@@ -285,7 +284,6 @@ def share_points(
 
     Parameters
     ----------
-    flora : Flora
     parts : PlantParts of n
         Sub-plants, or if ``lines`` are given branches alone.
     pixels : (n,) float64

@@ -312,7 +312,6 @@ def load_species(identifier: str, folders: Sequence[Path] = (), known: Mapping[s
 
     Parameters
     ----------
-    identifier : str
     folders : sequence of Path
         As of `list_species`.
     known : mapping, optional

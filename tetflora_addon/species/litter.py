@@ -74,14 +74,7 @@ def _needle(size: float) -> float:
 
 
 def litter_page(species: Species, page: Mapping[str, Any]) -> dict[str, Any] | None:
-    """The page of a patch of fallen leaves, or of needles, twigs and cones; None of a species without leaves.
-
-    Parameters
-    ----------
-    species : Species
-    page : mapping
-        What its species file holds.
-    """
+    """The page of a patch of fallen leaves, or of needles, twigs and cones; None of a species without leaves."""
     bearing = [order for order in species.orders if order.leaves.mean > 0 and order.leaf_kind == LEAF_KINDS[0]]
     if not bearing:
         return None
@@ -238,14 +231,7 @@ def shed_share(species: Species) -> float:
 
 
 def leaves_page(species: Species, page: Mapping[str, Any]) -> dict[str, Any] | None:
-    """The page of a patch of leaves that fall in autumn; None of a species that sheds none.
-
-    Parameters
-    ----------
-    species : Species
-    page : mapping
-        What its species file holds.
-    """
+    """The page of a patch of leaves that fall in autumn; None of a species that sheds none."""
     made = litter_page(species, page) if shed_share(species) > 0.0 else None
     if made is None:
         return None

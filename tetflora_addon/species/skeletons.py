@@ -508,8 +508,7 @@ def _roots(points: Floats, pairs: Integers, size: float) -> Integers:
     there = (degree != 2) & (away <= _AT_ORIGIN * size)
     order = np.lexsort((points[:, 2], degree != 1, np.where(there, away, np.inf)))
     order = order[degree[order] > 0]
-    part = connected(n, *pairs.T)
-    return order[np.unique(part[order], return_index=True)[1]]
+    return order[np.unique(connected(n, *pairs.T)[order], return_index=True)[1]]
 
 
 def _pipe_radii(points: Floats, parent: Integers) -> Floats:

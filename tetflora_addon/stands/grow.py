@@ -14,7 +14,7 @@ Plants come planted, or from seeds of the plants around and of the woods outside
 they are structures of arrays; records are what a simulation says of them at several years.
 """
 
-from collections.abc import Generator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from enum import IntEnum
 from typing import Self
@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 from ..arrays import Arrays, Floats, Floats32, Integers, Integers32, Keys, Mask, column, nested
 from ..errors import TetFloraError
 from ..growth.hashing import child_key, key_of_seed, uniform
-from ..jobs import Progress
+from ..jobs import Job, Progress
 from ..parallel import blocks, on_all_cores
 from ..parameters import script_setting, setting, within
 from ..species.ecology import crown_leaves
@@ -84,8 +84,7 @@ class Records(Arrays):
         exact = part == 1.0
         for name, value in mixed.items():
             value[exact] = getattr(second, name)[exact]
-        years = np.full(len(after), year, np.float32)
-        return replace(first, year=years, **mixed)
+        return replace(first, year=np.full(len(after), year, np.float32), **mixed)
 
 
 def in_order(rows: Records) -> Records:
@@ -530,9 +529,7 @@ class StandSettings:
     open_edges: bool = script_setting(False)
 
 
-def grow(
-    site: StandSite, species: Sequence[StandSpecies], settings: StandSettings
-) -> Generator[Progress, object, Records]:
+def grow(site: StandSite, species: Sequence[StandSpecies], settings: StandSettings) -> Job[Records]:
     """Grow a stand; a job, which yields after each year and returns its records.
 
     These are of plants at year 0, each ``interval`` years, at the end, and whenever one appears, dies, falls or is
@@ -676,8 +673,7 @@ class GrowingStand:
         self._decay(year, False)
         end = [self.plants.records(year, self.traits, self.site), self.dead.records(year)]
         tall = np.flatnonzero(end[0].height >= self.settings.min_height)
-        known = Records.concatenate([*self.kept, end[0].take(tall), end[1]])
-        first = in_order(known)
+        first = in_order(Records.concatenate([*self.kept, end[0].take(tall), end[1]]))
         if not len(first):
             return first
         # A dead tree that falls in the last year is recorded twice: the same row.

@@ -119,7 +119,9 @@ class LeafCopies:
         """The mesh, once all copies are placed."""
         model, n, level = self.model, self.done, isinstance(self.of, LeafLevel)
         if level:
-            self._color_level(self.of)
+            self.color = np.asarray(self.of.colors(self.color[: self.done]), np.float32)
+            if self.of.solid:
+                self.transmission = self._through()
         edges, edge_of_corner = model.edges
         vertices, corners = len(model.positions), len(model.corner_verts)
         starts = _stepped(model.face_offsets[:-1], corners, n)
@@ -150,12 +152,6 @@ class LeafCopies:
             },
             smooth=level or (model.closed and not model.textured),  # fruit and fleshy leaves are round
         )
-
-    def _color_level(self, level: LeafLevel) -> None:
-        """Give the faces of a level their own colors."""
-        self.color = np.asarray(level.colors(self.color[: self.done]), np.float32)
-        if level.solid:
-            self.transmission = self._through()
 
     def _through(self) -> float:
         """Transmission of the faces of solid needles, which light passes twice; their colors are changed to it.
@@ -230,10 +226,8 @@ def leaf_meshes(
 
     Parameters
     ----------
-    flora : Flora
     species : int
         Index into the flora's species.
-    whole : sequence of WholeBranches
     fractions_of : callable, optional
         Fractions (n,), (n,), (n,) of the leaves of branches that are wanted, and of these that are kites, and kites or
         a kite for each plane; the leaves' own random numbers decide which.

@@ -153,8 +153,7 @@ def curve(lines: Axes, radius: Floats, weight: Floats) -> Curve:
         0 for straight segments, 1 for the whole curve.
     """
     n, most = len(lines.segments), lines.frames.shape[1]
-    segment = np.arange(most)
-    there = segment < lines.segments[:, None]
+    there = np.arange(most) < lines.segments[:, None]
     chord = np.diff(lines.knots, axis=1)
     length = _norm(chord)[..., None]
     ahead = np.where(there[..., None], lines.frames[..., 2], 0.0)
@@ -590,8 +589,7 @@ _LEAN, _SUNK = 0.62, 0.75
 
 def bud_numbers(flora: Flora, whole: WholeBranches) -> Integers:
     """Rings (n,) of the buds of near branches."""
-    owner = _places(flora, whole)[0]
-    return BUD_RINGS * np.bincount(owner, minlength=len(whole))
+    return BUD_RINGS * np.bincount(_places(flora, whole)[0], minlength=len(whole))
 
 
 def bud_sides(sides: int | Integers) -> Integers:

@@ -55,8 +55,6 @@ def tube_buffers(
 
     Parameters
     ----------
-    flora : Flora
-    whole : sequence of WholeBranches
     pixels : Pixels, optional
         How large they are; near branches are rounder then, and bent, and have feet.
     most_sides : int, optional
@@ -170,13 +168,12 @@ class _Tubes:
 
     def buffers(self) -> MeshBuffers:
         """The mesh."""
-        faces = len(self.corner_verts)
         return MeshBuffers(
             positions=self.positions,
             edge_verts=self.edge_verts,
             corner_verts=self.corner_verts.reshape(-1),
             corner_edges=self.corner_edges.reshape(-1),
-            face_offsets=np.arange(0, 4 * faces + 1, 4, dtype=np.int32),
+            face_offsets=np.arange(0, 4 * len(self.corner_verts) + 1, 4, dtype=np.int32),
             attributes=wood_attributes(self.uv.reshape(-1, 2), self.color, self.girth, self.velocity),
             smooth=True,
         )
@@ -283,7 +280,6 @@ def twig_buffers(flora: Flora, whole: WholeBranches, wider: Floats, parts: Integ
 
     Parameters
     ----------
-    flora : Flora
     whole : WholeBranches of n
         Of any rows.
     wider : (n,) float64

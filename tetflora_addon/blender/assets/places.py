@@ -474,8 +474,6 @@ def plant_places(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> list
     Errors are those of `read_places`.
     """
     read = read_asset_plants(scene, depsgraph)
-    if not read:
-        return []
     species = asset_species(scene)
     variants = {one: variants_of(species[one], depsgraph) for one in {plants.species for plants in read}}
     found = []
@@ -661,5 +659,4 @@ def _sizeable(matrices: Floats) -> Mask:
     """Whether each of some places (n, 4, 4) has a size along three axes."""
     x, y, z = (matrices[:, :3, i] for i in range(3))
     longest = np.sqrt(np.maximum.reduce([np.einsum("ni,ni->n", axis, axis) for axis in (x, y, z)]))
-    volume = np.abs(np.einsum("ni,ni->n", x, np.cross(y, z)))
-    return volume > _TINY * longest**3
+    return np.abs(np.einsum("ni,ni->n", x, np.cross(y, z))) > _TINY * longest**3

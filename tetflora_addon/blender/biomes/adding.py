@@ -324,8 +324,7 @@ def lay_biome_soil(depsgraph: bpy.types.Depsgraph, grounds: Sequence[bpy.types.O
     fits = [obj for obj in grounds if may_have_soil(obj)]
     if not fits:
         return [obj.name for obj in grounds]
-    triangles = read_ground(fits, depsgraph).triangles
-    sheet = Sheet.over(triangles.reshape(-1, 3), _CELL, _MOST)
+    sheet = Sheet.over(read_ground(fits, depsgraph).triangles.reshape(-1, 3), _CELL, _MOST)
     cells = sheet.rows * sheet.columns
     on_it = set(fits)
     # Groups of the artist's own layers have no file, which says what soil is like.

@@ -244,8 +244,7 @@ def _mesh(
     write(mesh, "position", points - middle)
     mesh.update(calc_edges=True)
     mesh.shade_smooth()
-    layer = mesh.uv_layers.new(name="UVMap")
-    write(mesh, layer.name, uv[faces.ravel()])
+    write(mesh, mesh.uv_layers.new(name="UVMap").name, uv[faces.ravel()])
     if material is None:
         low, high = points[:, :2].min(axis=0), points[:, :2].max(axis=0)
         shape = (2, 2)
@@ -318,8 +317,7 @@ def outline_steps(order: Import, kind: str = "") -> Steps:
         for number, (outline, own) in enumerate(zip(outlines, rings, strict=True)):
             if number % _BATCH == 0:
                 yield Progress(0.5 + 0.5 * number / len(outlines), "Drawing outlines")
-            curve = _curve(outline, own, heights)
-            made[KINDS.index(outline.kind)].objects.link(curve)
+            made[KINDS.index(outline.kind)].objects.link(_curve(outline, own, heights))
     except BaseException:  # an error, or Esc
         _remove([top, *made])
         raise

@@ -332,8 +332,7 @@ class NodeValues:
         key = tuple(n.as_pointer() for n in (node, *stack))
         if key not in self._images:
             outer, self._scale = self._scale, 1.0
-            vector = find_socket(node.inputs, "Vector")
-            if source_of(vector, stack)[0] is None:
+            if source_of(find_socket(node.inputs, "Vector"), stack)[0] is None:
                 u, v, self._size = self._points.uv("")
             else:
                 self._size = np.zeros((1, 1), np.float32)

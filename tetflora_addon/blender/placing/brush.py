@@ -229,8 +229,7 @@ class Stroke:
 
     def _make(self, places: Floats, keys: Keys) -> None:
         brush, species = brush_of(self.scene)
-        made = strokes.individuals(brush, keys)
-        placement = Placement(position=places, wanted=len(keys), **made)
+        placement = Placement(position=places, wanted=len(keys), **strokes.individuals(brush, keys))
         standing = self.standing
         store, number = self.scene.tetflora.brush.store, len(standing.objects) + len(keys)
         if not (store == 'FIELD' or (store == 'AUTOMATIC' and number > properties.MOST_PAINTED_EMPTIES)):

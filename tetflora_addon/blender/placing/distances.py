@@ -14,7 +14,7 @@ from ...compiled.sizes import Crown
 from ...errors import SpeciesError
 from ...planting.rules import suggested_distance
 from ...species.kinds import Kind
-from ..scene.crowns import crown_for, crown_to_draw
+from ..scene.crowns import crown_for
 from ..settings import active_in
 from ..species.catalog import default_species
 
@@ -68,11 +68,6 @@ def follows_species(settings: bpy.types.PropertyGroup) -> bool:
 def distance_of(settings: bpy.types.PropertyGroup) -> float:
     """Distance in meters that counts for a population or brush: its own, or the one that suits its species."""
     return suggestion(settings) if follows_species(settings) else settings.min_distance
-
-
-def distance_to_draw(settings: bpy.types.PropertyGroup) -> float | None:
-    """The same for panels: None for a moment, until the crowns of the species are known."""
-    return suggestion(settings, crown_to_draw) if follows_species(settings) else settings.min_distance
 
 
 def suggestion(

@@ -99,7 +99,6 @@ def build(context: bpy.types.Context, seed: int) -> tuple[bpy.types.Scene, str]:
 
     Parameters
     ----------
-    context : bpy.types.Context
     seed : int
         Another seed is another forest on the same ground.
 

@@ -92,7 +92,6 @@ def add_plants_steps(
 
     Parameters
     ----------
-    placement : Placement
     species : sequence of str
         Identifiers that ``placement.species`` refers to.
     collection : bpy.types.Collection, optional
@@ -203,7 +202,6 @@ def add_field(
 
     Parameters
     ----------
-    placement : Placement
     species : sequence of str
         Identifiers that ``placement.species`` refers to.
     collection : bpy.types.Collection, optional
@@ -502,8 +500,7 @@ def _join_equal_kinds(obj: bpy.types.Object) -> None:
     if len(unique) == len(kinds):
         return
     to = np.array([unique.index(kind) for kind in kinds], np.int32)
-    attribute = own_mesh(obj).attributes["species"]
-    values = values_of(attribute)
+    values = values_of(own_mesh(obj).attributes["species"])
     # Numbers that the list does not have stay wrong: reading the field tells of them.
     known = (values >= 0) & (values < len(to))
     values[known] = to[values[known]]

@@ -382,8 +382,7 @@ def read_search(
     rules, species = rules_from(population)
     if most is not None:
         rules = replace(rules, count=min(rules.count, most))
-    masks = {name: getattr(population, name) for name in MASKS}
-    ground = read_ground(grounds, depsgraph, **masks)
+    ground = read_ground(grounds, depsgraph, **{name: getattr(population, name) for name in MASKS})
     suits = read_suits(depsgraph, population, ground.triangles, species)
     present = standing(depsgraph, own, species)
     zones = read_zones(depsgraph, population, grounds)

@@ -129,7 +129,6 @@ def read_ground(
     ----------
     objects : iterable of bpy.types.Object
         Meshes.
-    depsgraph : bpy.types.Depsgraph
     vertex_group : str
         Group whose weights define how suitable the ground is; every mesh needs it, or a float attribute of its name.
     image : bpy.types.Image, optional

@@ -198,8 +198,7 @@ def _model_of(species: Species, source: bpy.types.Object, depsgraph: bpy.types.D
             f'"{source.name}", the {kind} of "{species.name}", has no faces; add faces or choose another mesh'
         )
     offsets, corners = arrays.face_offsets, arrays.corner_verts
-    faces = [corners[a:b].tolist() for a, b in pairwise(offsets)]
-    model = leaf_model(arrays.positions, faces)
+    model = leaf_model(arrays.positions, [corners[a:b].tolist() for a, b in pairwise(offsets)])
     if uv_map := arrays.rendered[0]:
         model = replace(model, uv=arrays.layers[uv_map].values, textured=True)
     return replace(model, material_index=arrays.slots) if arrays.slots.any() else model

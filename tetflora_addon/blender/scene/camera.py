@@ -44,8 +44,7 @@ def read_camera(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, region_o
             f'The scene "{scene.name}" has no active camera; add one (Add > Camera) '
             "or choose one in the Scene properties"
         )
-    evaluated = scene.camera.evaluated_get(depsgraph)
-    name, data = scene.camera.name, evaluated.data
+    name, data = scene.camera.name, scene.camera.evaluated_get(depsgraph).data
     if scene.camera.type != 'CAMERA':
         raise SceneError(f'The active camera "{name}" is not a camera object; choose a camera in the Scene properties')
     if data.type not in {'PERSP', 'ORTHO', 'PANO'}:

@@ -168,8 +168,7 @@ def _surface(name: str, mesh: bpy.types.Mesh, materials: list[bpy.types.Material
 
 def _attributes(mesh: bpy.types.Mesh, corner_verts: Integers32, sizes: Integers32) -> Iterator[tuple[str, Floats32]]:
     """Attributes of floating point numbers at corners (c, k), the UV map that renders first."""
-    layers = mesh.uv_layers
-    first = next((layer.name for layer in layers if layer.active_render), "")
+    first = next((layer.name for layer in mesh.uv_layers if layer.active_render), "")
     for attribute in sorted(mesh.attributes, key=lambda a: a.name != first):
         if attribute.name.startswith(".") or attribute.name in _OWN or attribute.data_type not in _TYPES:
             continue

@@ -103,8 +103,7 @@ def _of_curve(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> skeleton
     finally:
         if evaluated.is_evaluated:
             evaluated.to_curve_clear()
-    chains = skeletons.Chains.concatenate(parts)
-    return _meant_radii(chains, _thickness(obj.data))
+    return _meant_radii(skeletons.Chains.concatenate(parts), _thickness(obj.data))
 
 
 def spline_chain(spline: bpy.types.Spline) -> skeletons.Chains:

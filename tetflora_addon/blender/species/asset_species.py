@@ -166,8 +166,7 @@ def picture_of(entry: TetFloraAssetSpecies) -> NDArray[np.uint8] | None:
     """The stored picture; None where there is none that could be read."""
     size = PICTURE_SIDE * PICTURE_SIDE * 4
     try:
-        unpack = zlib.decompressobj()
-        pixels = unpack.decompress(base64.b85decode(entry.picture.encode()), size)
+        pixels = zlib.decompressobj().decompress(base64.b85decode(entry.picture.encode()), size)
     except (ValueError, zlib.error):
         return None
     return np.frombuffer(pixels, np.uint8).reshape(PICTURE_SIDE, PICTURE_SIDE, 4) if len(pixels) == size else None

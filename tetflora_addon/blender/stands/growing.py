@@ -56,8 +56,7 @@ def stand_site(ground: Terrain, soil: Soil) -> tuple[StandSite, Floats]:
     SceneError
         No plant can be anywhere.
     """
-    triangles = ground.triangles
-    grid, wetness = _grid(triangles, soil.relief)
+    grid, wetness = _grid(ground.triangles, soil.relief)
     there = np.isfinite(grid.height)
     if not there.any():
         raise SceneError(
@@ -111,8 +110,7 @@ def _masks(ground: Terrain, grid: HeightGrid) -> Floats:
         # Weights stand on the triangles as heights do.
         lifted = ground.triangles.copy()
         lifted[..., 2] = np.clip(ground.weight, 0.0, 1.0)
-        weights = height_grid(lifted, grid.cell).height
-        suitable *= np.nan_to_num(weights).reshape(-1)
+        suitable *= np.nan_to_num(height_grid(lifted, grid.cell).height).reshape(-1)
     if ground.areas:
         suitable *= inside_any(middles, ground.areas)
     paths = lines_of_paths(ground.paths)

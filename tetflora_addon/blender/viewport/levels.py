@@ -258,7 +258,6 @@ def follow(
 
     Parameters
     ----------
-    scene, depsgraph, preview
     views : list of (4, 4) float64
         From the world to what viewports show of it.
     """
