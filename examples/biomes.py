@@ -116,7 +116,9 @@ VIEWS = {
         beside="meadow",
         water=0.3,
     ),
-    "spruce_forest": View((0.0, -40.0, 1.6), (0.0, 0.0, 3.8), 26.0, (54.0, 215.0), gray=0.3, haze=_CLEAR, free=5.0),
+    "spruce_forest": View(
+        (0.0, -40.0, 1.6), (0.0, 0.0, 3.8), 26.0, (54.0, 215.0), gray=0.4, haze=_CLEAR, light=2.2, free=5.0
+    ),
     "tropical_understory": View(
         (0.0, -38.0, 1.6),
         (0.0, 0.0, 4.2),
