@@ -45,6 +45,8 @@ _LAND = 460.0
 _HIDDEN = 0.004
 #: How much of soil is hidden where it is green, as its material has it.
 _GREEN = 0.85
+#: Height from which on what covers the ground is in a camera's way, meters.
+_KNEE = 0.75
 #: Sine of the height of the sun that lights land far away, about the middle of the views.
 _SUN = 0.67
 
@@ -66,7 +68,7 @@ class View:
     light : float
         Of the sun and the sky over that of open land: woods are longer exposed.
     free : float
-        Meters in front of the camera without trees and shrubs.
+        Meters in front of the camera without trees and shrubs; 0 for a camera that stands where it is told.
     beside : str
         A biome whose low plants cover the ground that this one leaves.
     water : float
@@ -114,7 +116,9 @@ VIEWS = {
         beside="meadow",
         water=0.3,
     ),
-    "spruce_forest": View((0.0, -40.0, 1.6), (0.0, 0.0, 3.8), 26.0, (54.0, 215.0), gray=0.3, haze=_CLEAR, free=5.0),
+    "spruce_forest": View(
+        (0.0, -40.0, 1.6), (0.0, 0.0, 3.8), 26.0, (54.0, 215.0), gray=0.4, haze=_CLEAR, light=2.2, free=5.0
+    ),
     "tropical_understory": View(
         (0.0, -38.0, 1.6),
         (0.0, 0.0, 4.2),
@@ -135,8 +139,16 @@ ABOVE, BELOW, ABOVE_LENS, ABOVE_GRAY = (0.0, -95.0, 105.0), (0.0, 0.0, 0.0), 64.
 
 
 #: The picture of the README: the wood of birches and pines against a low sun.
-INTERIOR = replace(VIEWS["birch_pine"], lens=30.0, sun=(20.0, 24.0), haze=(0.0009, (0.75, 0.68, 0.5)))
-INTERIOR_SIZE, INTERIOR_SAMPLES = (1600, 900), 64
+INTERIOR = replace(
+    VIEWS["birch_pine"],
+    eye=(-9.5, -45.5, 1.6),
+    lens=30.0,
+    sun=(20.0, 24.0),
+    gray=0.41,
+    haze=(0.0009, (0.75, 0.68, 0.5)),
+    free=0.0,
+)
+INTERIOR_SIZE, INTERIOR_SAMPLES = (1600, 900), 48
 
 
 def build(identifier: str, view: View) -> None:
@@ -209,14 +221,16 @@ def _from_afar(scene: bpy.types.Scene, land: bpy.types.Object) -> list[float]:
 
 def _clear(scene: bpy.types.Scene, view: View) -> tuple[float, float, float]:
     """The place nearest to that of a view from which no plant stands close in the picture."""
+    if not view.free:
+        return view.eye
     from tetflora_addon.blender.placing.canopy import canopy_of
 
     canopy, _ = canopy_of(scene, bpy.context.evaluated_depsgraph_get())
     plants, reach = [canopy.position[:, :2]], [view.free + 0.3 * canopy.radius]
     for read, crowns in _covers(scene):
         high = np.array([crown.height for crown in crowns])[read.species] * read.scale
-        plants.append(read.position[high > 0.3, :2])
-        reach.append(2.2 * high[high > 0.3])
+        plants.append(read.position[high > _KNEE, :2])
+        reach.append(2.2 * high[high > _KNEE])
     plants, reach = np.concatenate(plants), np.concatenate(reach)
     near = np.hypot(*(plants - view.eye[:2]).T) < 30.0
     plants, reach = plants[near], reach[near]
