@@ -179,7 +179,7 @@ def test_the_text_says_that_it_is_an_estimate(monkeypatch):
     scene, layer = bpy.context.scene, bpy.context.view_layer
     _forecast()
     text = forecast.forecast_text(scene, layer)
-    assert re.fullmatch(r"About \d+ (s|min), [\d.,]+( M)? polygons, \d+\.\d GB", text)
+    assert re.fullmatch(r"About \d+ (s|min), [\d.,]+( [kM])? polygons, \d+\.\d GB", text)
     scene.tetflora.max_polygons = 1000
     assert forecast.forecast_text(scene, layer).endswith("\nLimited by Max Polygons")
     scene.tetflora.max_polygons, scene.tetflora.max_memory = 0, 0.01
@@ -196,7 +196,11 @@ def test_times_are_rounded(seconds, shown):
 
 
 @pytest.mark.parametrize(
-    ("number", "shown"), [(0.0, "0"), (987.0, "990"), (123_456.0, "120,000"), (4_120_000.0, "4.1 M"), (3.66e7, "37 M")]
+    ("number", "shown"),
+    [
+        *((0.0, "0"), (987.0, "990"), (8_449.0, "8,400"), (123_456.0, "120 k"), (999_999.0, "1 M")),
+        *((4_120_000.0, "4.1 M"), (3.66e7, "37 M")),
+    ],
 )
 def test_polygons_are_rounded(number, shown):
     assert forecast.polygons_text(number) == f"{shown} polygons"

@@ -189,7 +189,7 @@ def test_a_frozen_cover_is_refused_and_stays():
 
 
 def test_without_population_ground_or_plants_it_says_what_to_do():
-    with pytest.raises(RuntimeError, match="Add a layer first"):
+    with pytest.raises(RuntimeError, match="Click a Scatter or Cover layer first"):
         bpy.ops.tetflora.ground_cover()
     ground = _wood()
     for tree in [o for o in bpy.context.scene.objects if o.tetflora.is_plant]:

@@ -13,6 +13,7 @@ import pytest
 from panels import refine
 from tests.blender.scenes import add_camera, add_mesh, add_plant, select
 from tetflora_addon.blender import runtime
+from tetflora_addon.blender.biomes import layers
 from tetflora_addon.blender.compat import shader_tree
 from tetflora_addon.blender.placing import populations
 from tetflora_addon.blender.viewport import warnings
@@ -144,6 +145,24 @@ def test_grounds_that_are_small_or_scaled_are_mended():
     assert max(v.co.x for v in scaled.data.vertices) == pytest.approx(20.0)
 
 
+@pytest.mark.parametrize("stand", [False, True])
+def test_a_small_ground_is_mended_by_one_click_and_what_grows_on_it_is_due(stand):
+    """Its plants stand where they stood, in the middle of a bare ground, and Update said that nothing was to do."""
+    scene = bpy.context.scene
+    small = add_mesh("small", size=4.0)
+    select(small)
+    scene.tetflora.stand.years, scene.tetflora.stand.density = 2, 2000.0
+    made = bpy.ops.tetflora.grow_stand() if stand else bpy.ops.tetflora.populate(count=2, min_distance=1.0)
+    assert made == {'FINISHED'}
+    assert "small small" in _keys()
+    assert layers.due_layers(scene) == []
+    _mend("small small")
+    assert small.dimensions.x == pytest.approx(100.0)
+    assert tuple(small.scale) == (1.0, 1.0, 1.0)
+    assert "scale small" not in _keys()
+    assert len(layers.due_layers(scene)) == 1
+
+
 def test_the_panel_has_one_line_whatever_is_wrong():
     from devtools.layouts import Layout
 
@@ -192,6 +211,15 @@ def test_an_animated_camera_stays_and_nothing_to_stand_on_is_told():
     bpy.ops.tetflora.look()
     assert bpy.context.scene.camera != camera
     assert tuple(camera.location) == (5.0, 0.0, 2.0)
+
+
+def test_a_mixed_wood_of_the_usual_density_is_dark_at_eye_height():
+    """A first wood on one's own ground rendered nearly black, and nothing was to mend."""
+    select(add_mesh("ground", size=50.0))
+    bpy.ops.tetflora.populate(count=200, species="beech:1, rowan:1, spruce:1")
+    bpy.ops.tetflora.daylight()
+    bpy.ops.tetflora.look()
+    assert _keys() == ["shade"]
 
 
 def test_a_closed_wood_is_dark_inside_until_it_is_brightened():

@@ -16,7 +16,7 @@ from ..placing.populations import add_population
 from ..placing.rules import BIOME_ONLY, awaits_update, copy_settings, grounds_of, set_grounds
 from ..runtime import Handlers
 from ..scene.fields import has_history, stored_size
-from ..settings import BIOME, FIELD, SCATTER, active_in
+from ..settings import BIOME, FIELD, SCATTER, active_in, rules_of
 from ..stands.growing import stand_settings_now
 
 
@@ -186,7 +186,7 @@ def group_layer(scene: bpy.types.Scene) -> bool:
     if above and layers[index_of(scene, above[0])].kind == BIOME:
         _put_into(layer, above[0])
     else:
-        grounds = grounds_of(scene, layer.field.tetflora.stand if layer.kind == FIELD else layer)
+        grounds = grounds_of(scene, rules_of(layer))
         made = add_population(scene, grounds, name="Group")
         made.kind, made.limits, made.gives_way, group = BIOME, set(), False, made.uid
         for one in (*above, uid):

@@ -81,6 +81,11 @@ def learn(expected: Estimate | None, seconds: float) -> None:
         _learned = float(np.clip(seconds / max(expected.seconds, 0.1), 0.1, 100.0))
 
 
+def seconds_here(expected: Estimate) -> float:
+    """Seconds that what is expected takes on this machine, as it took last."""
+    return expected.seconds * _learned
+
+
 def forecast_text(scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer) -> str:
     """``About 12 s, 4.1 M polygons, 2.5 GB``, and in a second line which limit holds; empty where nothing can be known.
 
@@ -94,7 +99,7 @@ def _text_for(scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer) -> str:
     if found is None:
         # Plants are there, and their crowns are being looked for.
         return "" if _counted.stand is not None or scene.camera is None else "Estimating…"
-    seconds = seconds_text(found.seconds * _learned)
+    seconds = seconds_text(seconds_here(found))
     text = f"About {seconds}, {polygons_text(found.primitives)}, {found.memory / _GIGA:.1f} GB"
     if not found.limited:
         return text
@@ -118,10 +123,10 @@ def seconds_text(seconds: float) -> str:
 
 
 def polygons_text(number: float) -> str:
-    """A number of polygons in two digits."""
-    if number >= _MEGA:
-        return f"{number / _MEGA:.2g} M polygons" if number < 10.0 * _MEGA else f"{number / _MEGA:,.0f} M polygons"
-    return f"{float(f'{number:.2g}'):,.0f} polygons"
+    """A number of polygons in two digits, and few letters: a sidebar has room for no more."""
+    number = float(f"{number:.2g}")
+    size, unit = (1.0, "") if number < 1e4 else (1e3, " k") if number < _MEGA else (_MEGA, " M")
+    return f"{number / size:,g}{unit} polygons"
 
 
 def _count(scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer) -> Stand | None:
