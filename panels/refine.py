@@ -72,7 +72,7 @@ def state_of(scene: bpy.types.Scene) -> str:
     if settings.auto_refine:
         return auto.message() or "Refine Automatically is on"
     if scene.camera is not None and (changed := auto.changed_since(scene)):
-        return f"Out of date: {', '.join(changed)} changed"
+        return f"Out of date: {changed[0]} {'and more' if len(changed) > 1 else 'changed'}"
     return hint(scene) or made_of(settings.statistics) or "Nothing refined yet"
 
 
@@ -86,4 +86,4 @@ def hint(scene: bpy.types.Scene) -> str:
     # The first object of a collection shows whether it was kept as meshes: a panel cannot look through all objects.
     first = (part.objects[0] if part.objects else None for part in scene.collection.children_recursive)
     kept = any(obj is not None and KIND in obj for obj in first)
-    return "" if kept or not has_plants(scene) else "Nothing is refined, so renders show no plants"
+    return "" if kept or not has_plants(scene) else "Not refined: renders show no plants"

@@ -90,7 +90,7 @@ class Pace:
         return False
 
     def remaining(self, fraction: float, expected: float = 0.0) -> float:
-        """Seconds to the end: of those expected of the whole, or, once these are over, by what is done; 0 if unknown."""
+        """Seconds to the end: of what was expected of all or, once that is over, by what is done; 0 if unknown."""
         passed = time.monotonic() - self._begun
         if passed < expected:
             return expected - passed

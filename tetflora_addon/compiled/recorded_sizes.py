@@ -131,7 +131,7 @@ def of_dense_stand(species: Species) -> Species:
 
 
 def sized(
-    seeds: Seeds, ages: Floats | None, sizes: Sizes | None, find: Callable[[str], Species]
+    seeds: Seeds, ages: Floats | None, sizes: Sizes | None, find: Callable[[str], Species | None]
 ) -> tuple[Seeds, Floats | None]:
     """Plants (n,) of kinds that suit their recorded sizes, and the ages that are left to the others.
 
@@ -147,7 +147,8 @@ def sized(
         if not len(own):
             continue
         with suppress(SpeciesError):
-            species = find(Kind.read(kind).species)
+            if (species := find(Kind.read(kind).species)) is None:
+                continue
             if Kind.read(kind).skeleton:  # it is as it was drawn
                 scale[own] *= measure_of(species).fitted(seeds.take(own), sizes.take(own))[0]
                 continue

@@ -99,8 +99,9 @@ def _text_for(scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer) -> str:
     if found is None:
         # Plants are there, and their crowns are being looked for.
         return "" if _counted.stand is not None or scene.camera is None else "Estimating…"
-    seconds = seconds_text(seconds_here(found))
-    text = f"About {seconds}, {polygons_text(found.primitives)}, {found.memory / _GIGA:.1f} GB"
+    size = found.memory / _GIGA
+    taken = seconds_text(seconds_here(found)), polygons_text(found.primitives), f"{size:.{int(size < 10.0)}f} GB"
+    text = f"About {', '.join(taken)}"
     if not found.limited:
         return text
     most = scene.tetflora.max_polygons

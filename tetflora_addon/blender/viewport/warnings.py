@@ -65,7 +65,7 @@ def mend(scene: bpy.types.Scene, key: str) -> bool:
 def _look(scene: bpy.types.Scene) -> Iterator[Warned]:
     settings, camera = scene.tetflora, scene.camera
     for error in render_errors()[-1:]:
-        yield Warned("render", "Last render failed", error)
+        yield Warned("render", "Render failed", error)
     small, stretched = _grounds(scene)
     yield from small
     place = _places(scene)
@@ -118,17 +118,16 @@ def is_dark(scene: bpy.types.Scene) -> bool:
 
 def _grounds(scene: bpy.types.Scene) -> tuple[list[Warned], list[Warned]]:
     """Grounds of layers that are too small, and those whose scale is not applied."""
-    small: list[Warned] = []
-    stretched: list[Warned] = []
+    small, stretched = [], []
     grounds = dict.fromkeys(obj for layer in scene.tetflora.layers for obj in grounds_of(scene, rules_of(layer)))
     for obj in grounds:
         wide = max(obj.dimensions[:2])
         if 0.0 < wide < _SMALL:
-            text = f'"{obj.name}" is {wide:.3g} m wide; trees are tens of meters tall. Scale it, or take a larger mesh'
-            small.append(Warned(f"small {obj.name}", "Small ground", text, "Make 100 m", partial(_enlarge, obj)))
+            text = f'"{obj.name}" is {wide:.3g} m wide; trees are tens of meters tall. Enlarge makes it 100 m'
+            small.append(Warned(f"small {obj.name}", "Small ground", text, "Enlarge", partial(_enlarge, obj)))
         elif obj.parent is None and obj.data.users == 1 and not np.allclose(obj.scale, 1.0, rtol=1e-3):
             text = f'The scale of "{obj.name}" is not applied: textures on it are stretched. Apply makes it 1'
-            stretched.append(Warned(f"scale {obj.name}", "Scale not applied", text, "Apply", partial(_apply, obj)))
+            stretched.append(Warned(f"scale {obj.name}", "Scale of ground", text, "Apply", partial(_apply, obj)))
     return small, stretched
 
 
