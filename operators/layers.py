@@ -199,7 +199,7 @@ class TETFLORA_OT_move_layer(Reporting, Operator, label="Move Layer", told="dire
             return self.execute(context)
         if (index := layers.index_of(context.scene, self.layer)) >= 0:
             context.scene.tetflora.layers_index = index
-        self._before, self._at = layers.order_of(context.scene), event.mouse_y
+        self._before, self._at = [one.uid for one in context.scene.tetflora.layers], event.mouse_y
         context.window_manager.modal_handler_add(self)
         context.window.cursor_modal_set('MOVE_Y')
         return {'RUNNING_MODAL'}

@@ -5,7 +5,6 @@
 import bpy
 
 from ..operators.places import column_row
-from ..tetflora_addon.blender.runtime import open_menu
 from ..tetflora_addon.blender.species.edits import catalog
 from ..tetflora_addon.species.catalog import FIRST
 from .base import Button, draw_buttons, menu, thumbnail
@@ -168,8 +167,3 @@ def TETFLORA_MT_nothing_refined(layout: bpy.types.UILayout, context: bpy.types.C
     layout.label(text="Nothing is refined, and Refine at Render is off", icon='INFO')
     layout.operator("tetflora.refine", icon='MOD_DECIM')
     layout.prop(context.scene.tetflora, "refine_at_render")
-
-
-def open_nothing_refined() -> None:
-    """Open the menu, where there is a window."""
-    open_menu(TETFLORA_MT_nothing_refined.__name__)

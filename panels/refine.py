@@ -5,7 +5,7 @@
 import bpy
 
 from ..tetflora_addon.blender.job.forecast import forecast_text
-from ..tetflora_addon.blender.placing.first_forest import is_first_forest
+from ..tetflora_addon.blender.placing.first_forest import FIRST_FOREST
 from ..tetflora_addon.blender.results.output import KIND
 from ..tetflora_addon.blender.scene.objects import has_contents, has_plants
 from ..tetflora_addon.blender.viewport import auto
@@ -82,7 +82,8 @@ def hint(scene: bpy.types.Scene) -> str:
     if settings.statistics:
         return ""
     if settings.refine_at_render:
-        return "F12 renders, Refine shows it here" if is_first_forest(scene) and has_contents(scene) else ""
+        first = any(FIRST_FOREST in collection for collection in scene.collection.children)
+        return "F12 renders, Refine shows it here" if first and has_contents(scene) else ""
     # The first object of a collection shows whether it was kept as meshes: a panel cannot look through all objects.
     first = (part.objects[0] if part.objects else None for part in scene.collection.children_recursive)
     kept = any(obj is not None and KIND in obj for obj in first)

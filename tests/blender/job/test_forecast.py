@@ -8,6 +8,7 @@ import re
 import sys
 
 import bpy
+import numpy as np
 import pytest
 
 from tests.blender.scenes import add_camera, add_mesh, add_plant, depsgraph, select
@@ -102,6 +103,24 @@ def test_what_is_expanded_takes_what_was_told():
     found = _forecast()
     made = refine.refine(scene, depsgraph()).polygons_meshed
     assert 1 / 1.5 < found.primitives / made < 1.5
+
+
+@pytest.mark.parametrize("kind", ["beech", "hornbeam"])
+def test_trees_with_the_narrow_crowns_of_a_stand_have_its_few_leaves(kind):
+    """Those of a grown beech wood counted with fifty times their leaves: 1.66 times what was made was expected."""
+    add_camera()
+    _wood(20, as_field='FIELD', species=kind)
+    points = next(obj for obj in bpy.data.objects if obj.tetflora.is_field).data
+    leaves = {}
+    for name, width in (("narrow", 5.0), ("free", 16.0)):
+        for attribute, value in (("tf_height", 20.0), ("tf_crown_width", width)):
+            values = points.attributes.get(attribute) or points.attributes.new(attribute, 'FLOAT', 'POINT')
+            values.data.foreach_set("value", np.full(20, value, np.float32))
+        forecast._counted.layer = None
+        _forecast()
+        stand = forecast._counted.stand
+        leaves[name] = stand.number @ (np.array([crown.leaves for crown in stand.crowns])[stand.which] * stand.scale**2)
+    assert 0.0 < leaves["narrow"] < 0.3 * leaves["free"]
 
 
 def test_large_fields_are_known_by_a_sample():

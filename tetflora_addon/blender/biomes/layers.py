@@ -212,11 +212,6 @@ def _put_into(layer: Layer, group: str) -> None:
         layer.field.tetflora.stand.biome = group
 
 
-def order_of(scene: bpy.types.Scene) -> list[str]:
-    """Identities of all layers in their order."""
-    return [layer.uid for layer in scene.tetflora.layers]
-
-
 def _tidy(scene: bpy.types.Scene, active: str) -> None:
     """Let layers follow their biomes and groups."""
     sort_layers(scene, [uid for block in _blocks(scene.tetflora.layers) for uid in block], active)
@@ -224,7 +219,7 @@ def _tidy(scene: bpy.types.Scene, active: str) -> None:
 
 def sort_layers(scene: bpy.types.Scene, order: Sequence[str], active: str) -> None:
     """Bring the list into an order of identities."""
-    for place, uid in enumerate(order if list(order) != order_of(scene) else ()):
+    for place, uid in enumerate(order if list(order) != [one.uid for one in scene.tetflora.layers] else ()):
         scene.tetflora.layers.move(index_of(scene, uid), place)
     scene.tetflora.layers_index = index_of(scene, active)
 

@@ -15,12 +15,12 @@ from numpy.typing import NDArray
 
 from ... import memory
 from ...arrays import Floats, Integers
-from ...compiled.recorded_sizes import ages_of_heights
+from ...compiled.recorded_sizes import CROWDED, ages_of_heights, crowds
 from ...emission.budget import Estimate, Stand, estimate
 from ...errors import SpeciesError, TetFloraError
 from ...growth.seasons import PRESENT, expected_of
 from ...processes import pool
-from ...species.kinds import species_of
+from ...species.kinds import Kind, species_of
 from ..attributes import read, values_of
 from ..runtime import Handlers, Outlook, in_order
 from ..scene.ages import crown_kinds
@@ -222,7 +222,19 @@ def _field(scene: bpy.types.Scene, obj: bpy.types.Object, there: Integers) -> tu
         known = np.isfinite(tall) & (tall > 0.0)
         ages = np.where(known, _ages_of(scene, kinds, which, tall), ages)
         scale = np.where(known, own, scale)
-    return number, foot, *_aged(scene, scale, kinds, which, ages)
+    scale, species = _aged(scene, scale, kinds, which, ages)
+    wide = stored(obj.data, "tf_crown_width", chosen)
+    if tall is not None and wide is not None:
+        species = [_beside_others(scene, *one) for one in zip(species, tall.tolist(), wide.tolist(), strict=True)]
+    return number, foot, scale, species
+
+
+def _beside_others(scene: bpy.types.Scene, kind: str, tall: float, wide: float) -> str:
+    """The kind of a plant with a recorded height and width: with few leaves if its crown is as narrow as in a stand."""
+    one = Kind.read(kind)
+    crown = crown_to_draw(scene, one.species) if one.age and not one.dead else None
+    narrow = crown is not None and 0.0 < wide * crown.height < CROWDED * tall * 2.0 * crown.radius
+    return str(replace(one, crowded=True)) if narrow and crowds(species_for(scene, one.species)) else kind
 
 
 def _ages_of(scene: bpy.types.Scene, kinds: list[str], which: Integers, tall: NDArray[np.floating]) -> Floats:
