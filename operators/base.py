@@ -10,6 +10,7 @@ import bpy
 from bpy.props import BoolProperty, StringProperty
 
 from ..tetflora_addon.blender.file_library import ENDING
+from ..tetflora_addon.blender.job.forecast import seconds_text
 from ..tetflora_addon.blender.placing.plant_objects import plants_of
 from ..tetflora_addon.blender.runtime import remember
 from ..tetflora_addon.blender.worker import run_to_end
@@ -177,6 +178,7 @@ class ModalJob(Reporting):
     #: What is reported after Esc, and the status bar's text about keys.
     cancelled = "Cancelled; the scene is unchanged"
     keys = "Esc: Cancel"
+    expected = 0.0  # seconds of the whole job; 0 where they are not known
 
     _steps: Job[Any] | None = None
     _timer: bpy.types.Timer | None = None
@@ -253,7 +255,9 @@ class ModalJob(Reporting):
 
     def _show(self, context: bpy.types.Context, progress: Progress) -> None:
         context.window_manager.progress_update(progress.fraction)
-        context.workspace.status_text_set(f"TetFlora {progress.fraction:4.0%}   {progress.message}   |   {self.keys}")
+        left = self._pace.remaining(progress.fraction, self.expected)
+        done = f"{progress.fraction:4.0%}" + (f", {seconds_text(left)} left" if left else "")
+        context.workspace.status_text_set(f"TetFlora {done}   {progress.message}   |   {self.keys}")
 
     def _leave(self, context: bpy.types.Context) -> None:
         self._steps = None

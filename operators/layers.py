@@ -21,7 +21,7 @@ from ..tetflora_addon.blender.placing.first_forest import is_startup
 from ..tetflora_addon.blender.placing.populations import PlacedPlants, make_plants_steps, remove_layer, reroll_steps
 from ..tetflora_addon.blender.placing.rules import active_population, grounds_of, set_grounds
 from ..tetflora_addon.blender.runtime import is_there
-from ..tetflora_addon.blender.settings import BIOME, FIELD, with_identity
+from ..tetflora_addon.blender.settings import BIOME, FIELD, rules_of, with_identity
 from ..tetflora_addon.blender.stands import growing
 from ..tetflora_addon.blender.viewport import points
 from ..tetflora_addon.errors import SceneError, TetFloraError
@@ -39,12 +39,13 @@ def grounds_to_plant(context: bpy.types.Context) -> list[bpy.types.Object]:
     layer = layers.active_layer(context.scene)
     if (found := selected_grounds(context)) or layer is None:
         return found
-    return grounds_of(context.scene, layer.field.tetflora.stand if layer.kind == FIELD and layer.field else layer)
+    return grounds_of(context.scene, rules_of(layer))
 
 
 ground_selected = need(selected_grounds, "Select a mesh to plant on")
 ground_found = need(grounds_to_plant, "Select a mesh to plant on")
 layer_exists = need(lambda context: layers.active_layer(context.scene), "Add a layer first")
+scatter_active = need(lambda context: active_population(context.scene), "Click a Scatter or Cover layer first")
 _ACTIVE = (in_object_mode, layer_exists)
 _ROW = 20.0  # pixels of a row of a list at a scale of 1
 
@@ -198,7 +199,7 @@ class TETFLORA_OT_move_layer(Reporting, Operator, label="Move Layer", told="dire
             return self.execute(context)
         if (index := layers.index_of(context.scene, self.layer)) >= 0:
             context.scene.tetflora.layers_index = index
-        self._before, self._at = layers.order_of(context.scene), event.mouse_y
+        self._before, self._at = [one.uid for one in context.scene.tetflora.layers], event.mouse_y
         context.window_manager.modal_handler_add(self)
         context.window.cursor_modal_set('MOVE_Y')
         return {'RUNNING_MODAL'}
@@ -273,17 +274,12 @@ class TETFLORA_OT_set_layer_ground(Reporting, Operator, label="Use Selected Mesh
     def run(self, context: bpy.types.Context) -> set[str]:
         layer = layers.active_layer(context.scene)
         for one in (layer, *layers.children_of(layer)):
-            set_grounds(one.field.tetflora.stand if one.kind == FIELD and one.field else one, selected_grounds(context))
+            set_grounds(rules_of(one), selected_grounds(context))
         points.schedule()
         return {'FINISHED'}
 
 
-_may_be_snowy = need(
-    lambda context: active_population(context.scene), "Add a layer first; its ground can then have snow"
-)
-
-
-class TETFLORA_OT_ground_snow(Reporting, Operator, label="Snow on Ground", needs=(in_object_mode, _may_be_snowy)):
+class TETFLORA_OT_ground_snow(Reporting, Operator, label="Snow on Ground", needs=(in_object_mode, scatter_active)):
     """Add the snow of the scene to the materials of the active layer's ground, as a node before their output.
 
     Soil of Ground Cover needs none of it.
@@ -378,12 +374,7 @@ class TETFLORA_OT_add_biome(ModalJob, Operator, label="Add Biome", needs=(in_obj
         return tell_layers(self, f'"{result.name}": ', numbers, result.bare, result.kept, more)
 
 
-_may_be_covered = need(
-    lambda context: active_population(context.scene), "Add a layer first; its ground is then covered"
-)
-
-
-class TETFLORA_OT_ground_cover(ModalJob, Operator, label="Ground Cover", needs=(in_object_mode, _may_be_covered)):
+class TETFLORA_OT_ground_cover(ModalJob, Operator, label="Ground Cover", needs=(in_object_mode, scatter_active)):
     """Cover the ground under the active layer with grass, moss and herbs by the light there, and with leaves, branches
     and logs of its species where they fall.
 

@@ -9,7 +9,7 @@ from ..tetflora_addon.blender.biomes.layers import active_layer, children_of, fo
 from ..tetflora_addon.blender.declare import choice, once
 from ..tetflora_addon.blender.placing import plant_objects
 from ..tetflora_addon.blender.placing.ground import DropResult, drop_steps
-from ..tetflora_addon.blender.placing.populations import own_objects, recount
+from ..tetflora_addon.blender.placing.populations import own_number, own_objects
 from ..tetflora_addon.blender.scene.fields import fields_of, stored_size
 from ..tetflora_addon.blender.settings import SCATTER
 from ..tetflora_addon.blender.species.catalog import NO_SPECIES, operator_items
@@ -117,7 +117,8 @@ class TETFLORA_OT_remove_plants(Reporting, Operator, label="Remove Plants", told
             }
             return self.refused(f"{none[self.which]}; nothing removed")
         number = plant_objects.remove_plants(plants) + plant_objects.remove_fields(fields)
-        recount(context.scene)
+        for layer in context.scene.tetflora.layers:  # some of its plants may be gone
+            layer.made = own_number(own_objects(context.scene, layer))
         forget_gone(context.scene)
         return self.done(f"{counted(number, 'plant')} removed")
 

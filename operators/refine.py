@@ -8,7 +8,7 @@ from bpy.types import Operator
 from ..tetflora_addon.blender.declare import once
 from ..tetflora_addon.blender.job import refine
 from ..tetflora_addon.blender.job.contents import asset_warnings
-from ..tetflora_addon.blender.job.forecast import forecast, learn
+from ..tetflora_addon.blender.job.forecast import forecast, learn, seconds_here
 from ..tetflora_addon.blender.job.plant_mesh import make_plant_mesh_steps
 from ..tetflora_addon.blender.placing.plant_objects import prepare_scene
 from ..tetflora_addon.blender.results import hiding
@@ -42,6 +42,7 @@ class TETFLORA_OT_refine(base.ModalJob, Operator, label="Refine", needs=(base.in
     def steps(self, context: bpy.types.Context) -> Job[Statistics]:
         scene, nothing = context.scene, not has_results(context.scene)
         made_for, expected = auto.results_made_for(scene), forecast(scene, context.view_layer)
+        self.expected = seconds_here(expected) if expected else 0.0
         with auto.paused():
             job = refine.refine_steps(scene, context.evaluated_depsgraph_get(), first_look=nothing)
             try:

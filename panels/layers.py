@@ -10,7 +10,7 @@ from ..tetflora_addon.blender.biomes.library import FALLBACK_ICON, biomes, icon_
 from ..tetflora_addon.blender.placing.distances import follows_species, suggestion
 from ..tetflora_addon.blender.scene.crowns import crown_to_draw
 from ..tetflora_addon.blender.scene.fields import has_history
-from ..tetflora_addon.blender.settings import BIOME, FIELD, SCATTER, active_in
+from ..tetflora_addon.blender.settings import BIOME, FIELD, SCATTER, active_in, rules_of
 from ..tetflora_addon.blender.viewport import points
 from . import base
 
@@ -155,8 +155,7 @@ def TETFLORA_PT_layers(layout: bpy.types.UILayout, context: bpy.types.Context) -
         return
     column = layout.column()
     column.active = not layer.frozen
-    owner = layer.field.tetflora.stand if layer.kind == FIELD and layer.field is not None else layer
-    kind = kind_of(layer)
+    owner, kind = rules_of(layer), kind_of(layer)
     if layer.kind == SCATTER:
         _draw_scatter(column, layer)
     elif kind is STAND:

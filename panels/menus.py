@@ -5,7 +5,6 @@
 import bpy
 
 from ..operators.places import column_row
-from ..tetflora_addon.blender.runtime import open_menu
 from ..tetflora_addon.blender.species.edits import catalog
 from ..tetflora_addon.species.catalog import FIRST
 from .base import Button, draw_buttons, menu, thumbnail
@@ -50,22 +49,12 @@ _DROP = Button("drop_to_ground", 'TRIA_DOWN_BAR')
 _FIRST_FOREST = Button("first_forest", 'WORLD')
 
 
-def draw_place_menu(layout: bpy.types.UILayout) -> None:
-    """The menu of plants to place by clicking."""
-    layout.menu(TETFLORA_MT_place_plant.__name__, icon='RESTRICT_SELECT_OFF')
-
-
-def draw_species_menu(layout: bpy.types.UILayout) -> None:
-    """The menu of species to assign to selected plants."""
-    layout.menu(TETFLORA_MT_species.__name__, icon='OUTLINER_OB_EMPTY')
-
-
 def draw_in_add_menu(menu: bpy.types.Menu, _context: bpy.types.Context) -> None:
     """The entry in Blender's Add menu."""
     menu.layout.separator()
     _FIRST_FOREST.draw(menu.layout)
     menu.layout.menu(TETFLORA_MT_add_biome.__name__, icon=FALLBACK_ICON)
-    draw_place_menu(menu.layout)
+    menu.layout.menu(TETFLORA_MT_place_plant.__name__, icon='RESTRICT_SELECT_OFF')
     menu.layout.menu(TETFLORA_MT_add_plant.__name__, icon='OUTLINER_OB_FORCE_FIELD')
 
 
@@ -87,7 +76,7 @@ def TETFLORA_MT_marks(layout: bpy.types.UILayout, _context: bpy.types.Context) -
 @menu("TetFlora")
 def TETFLORA_MT_object(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
     """Operators for plants and ground, also because Blender's search (F3) finds only what a menu lists."""
-    draw_species_menu(layout)
+    layout.menu(TETFLORA_MT_species.__name__, icon='OUTLINER_OB_EMPTY')
     draw_buttons(
         layout,
         Button("reseed", 'FILE_REFRESH'),
@@ -103,7 +92,7 @@ def TETFLORA_MT_object(layout: bpy.types.UILayout, context: bpy.types.Context) -
     layout.menu(TETFLORA_MT_marks.__name__)
     layout.menu(TETFLORA_MT_layers.__name__)
     draw_buttons(layout, _POPULATE, Button("grow_stand", 'TIME'), Button("ground_cover", 'OUTLINER_OB_CURVES'), _PAINT)
-    draw_place_menu(layout)
+    layout.menu(TETFLORA_MT_place_plant.__name__, icon='RESTRICT_SELECT_OFF')
     layout.prop(context.scene.tetflora.species_editor, "shown", text="Species Editor")
     draw_buttons(
         layout,
@@ -167,9 +156,9 @@ def TETFLORA_MT_pie(layout: bpy.types.UILayout, _context: bpy.types.Context) -> 
     pie = layout.menu_pie()
     # West, east, south, north, north-west, north-east, south-west, south-east: Blender's own order.
     draw_buttons(pie, _PAINT, Button("refine", 'MOD_DECIM'), _POPULATE)
-    draw_place_menu(pie)
+    pie.menu(TETFLORA_MT_place_plant.__name__, icon='RESTRICT_SELECT_OFF')
     draw_buttons(pie, _DROP, Button("clear", 'TRASH'), _FIRST_FOREST)
-    draw_species_menu(pie)
+    pie.menu(TETFLORA_MT_species.__name__, icon='OUTLINER_OB_EMPTY')
 
 
 @menu("The Render Shows No Plants")
@@ -178,8 +167,3 @@ def TETFLORA_MT_nothing_refined(layout: bpy.types.UILayout, context: bpy.types.C
     layout.label(text="Nothing is refined, and Refine at Render is off", icon='INFO')
     layout.operator("tetflora.refine", icon='MOD_DECIM')
     layout.prop(context.scene.tetflora, "refine_at_render")
-
-
-def open_nothing_refined() -> None:
-    """Open the menu, where there is a window."""
-    open_menu(TETFLORA_MT_nothing_refined.__name__)

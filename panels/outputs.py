@@ -169,8 +169,9 @@ def made_of(text: str) -> str:
     polygons = figures["polygons_meshed"] + figures["polygons_proxy"]
     if not polygons and figures.get("instances"):
         return f"{figures['instances']:,} instances stay the originals"
-    made = f"{polygons_text(polygons)} made in {seconds_text(sum(figures['seconds'].values()))}"
-    return f"{made}, facets of {figures['facet_pixels']:.2g} pixels" if figures.get("coarser") else made
+    if figures.get("coarser"):
+        return f"{polygons_text(polygons)}, facets of {figures['facet_pixels']:.2g} pixels"
+    return f"{polygons_text(polygons)} made in {seconds_text(sum(figures['seconds'].values()))}"
 
 
 @lru_cache(maxsize=8)

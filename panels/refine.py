@@ -5,7 +5,7 @@
 import bpy
 
 from ..tetflora_addon.blender.job.forecast import forecast_text
-from ..tetflora_addon.blender.placing.first_forest import is_first_forest
+from ..tetflora_addon.blender.placing.first_forest import FIRST_FOREST
 from ..tetflora_addon.blender.results.output import KIND
 from ..tetflora_addon.blender.scene.objects import has_contents, has_plants
 from ..tetflora_addon.blender.viewport import auto
@@ -72,7 +72,7 @@ def state_of(scene: bpy.types.Scene) -> str:
     if settings.auto_refine:
         return auto.message() or "Refine Automatically is on"
     if scene.camera is not None and (changed := auto.changed_since(scene)):
-        return f"Out of date: {', '.join(changed)} changed"
+        return f"Out of date: {changed[0]} {'and more' if len(changed) > 1 else 'changed'}"
     return hint(scene) or made_of(settings.statistics) or "Nothing refined yet"
 
 
@@ -82,8 +82,9 @@ def hint(scene: bpy.types.Scene) -> str:
     if settings.statistics:
         return ""
     if settings.refine_at_render:
-        return "F12 renders, Refine shows it here" if is_first_forest(scene) and has_contents(scene) else ""
+        first = any(FIRST_FOREST in collection for collection in scene.collection.children)
+        return "F12 renders, Refine shows it here" if first and has_contents(scene) else ""
     # The first object of a collection shows whether it was kept as meshes: a panel cannot look through all objects.
     first = (part.objects[0] if part.objects else None for part in scene.collection.children_recursive)
     kept = any(obj is not None and KIND in obj for obj in first)
-    return "" if kept or not has_plants(scene) else "Nothing is refined, so renders show no plants"
+    return "" if kept or not has_plants(scene) else "Not refined: renders show no plants"

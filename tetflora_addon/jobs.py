@@ -70,7 +70,8 @@ class Pace:
 
     def __init__(self, least: float, most: float = _LONGEST) -> None:
         self._least, self._most, self._left = least, most, time.monotonic()
-        self._end, self._slow = self._left, False
+        self._begun = self._end = self._left
+        self._slow = False
 
     def begin(self) -> None:
         """Work begins; what has passed since it was left is what a redraw takes."""
@@ -87,6 +88,13 @@ class Pace:
             return True
         self._left = now
         return False
+
+    def remaining(self, fraction: float, expected: float = 0.0) -> float:
+        """Seconds to the end: of what was expected of all or, once that is over, by what is done; 0 if unknown."""
+        passed = time.monotonic() - self._begun
+        if passed < expected:
+            return expected - passed
+        return passed * (1.0 / fraction - 1.0) if passed > 3.0 and fraction > 0.05 else 0.0  # else too early to tell
 
 
 def run_to_end(steps: Generator[object, object, _Result]) -> _Result:

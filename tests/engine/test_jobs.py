@@ -59,6 +59,18 @@ def test_of_a_slow_window_most_of_the_time_is_work_and_esc_waits_no_longer_than_
     assert worked(clock, pace, 0.0, waiting) <= STEP  # soon again
 
 
+def test_the_time_that_is_left_follows_from_what_is_expected_and_then_from_what_is_done(clock: Clock) -> None:
+    pace = Pace(LEAST)
+    clock.now += 1.0
+    assert pace.remaining(0.5) == 0.0  # too early to tell
+    assert pace.remaining(0.5, expected=60.0) == pytest.approx(59.0)
+    clock.now += 19.0
+    assert pace.remaining(0.04) == 0.0
+    assert pace.remaining(0.25) == pytest.approx(60.0)
+    assert pace.remaining(0.8, expected=30.0) == pytest.approx(10.0)
+    assert pace.remaining(0.8, expected=10.0) == pytest.approx(5.0)
+
+
 def test_a_part_of_a_job_gets_what_is_sent_and_its_result_is_returned():
     received = []
 

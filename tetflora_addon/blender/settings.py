@@ -122,6 +122,11 @@ def with_identity(groups: Iterable[bpy.types.PropertyGroup], uid: str) -> bpy.ty
     return next((group for group in groups if group.uid == uid), None)
 
 
+def rules_of(layer: bpy.types.PropertyGroup) -> bpy.types.PropertyGroup:
+    """Where the settings of what grows in a layer are: in itself, or in the stand that it shows."""
+    return layer.field.tetflora.stand if layer.kind == FIELD and layer.field is not None else layer
+
+
 def active_in(owner: bpy.types.PropertyGroup, entries: str) -> bpy.types.PropertyGroup | None:
     """The active entry of a list of an owner; None without one."""
     found, index = getattr(owner, entries), getattr(owner, f"{entries}_index")

@@ -48,7 +48,7 @@ _MEASURED = 1  # times that a plant is, to fit it
 _WOODY = 3.0  # meters of height that plants reach whose leaves follow their crowns
 #: Crown width for the height over that of a free plant below which one grew between neighbors: halfway, by ratio; of
 #: what dense stands leave bare, the part from which on. Least part of the leaves on its twigs: the crown says how many.
-_CROWDED, _RAISED, _LEAFY = (1.0 - NARROWER) ** 0.5, 0.25, 0.5
+CROWDED, _RAISED, _LEAFY = (1.0 - NARROWER) ** 0.5, 0.25, 0.5
 
 
 @dataclass(frozen=True)
@@ -130,7 +130,7 @@ def of_dense_stand(species: Species) -> Species:
 
 
 def sized(
-    seeds: Seeds, ages: Floats | None, sizes: Sizes | None, find: Callable[[str], Species]
+    seeds: Seeds, ages: Floats | None, sizes: Sizes | None, find: Callable[[str], Species | None]
 ) -> tuple[Seeds, Floats | None]:
     """Plants (n,) of kinds that suit their recorded sizes, and the ages that are left to the others.
 
@@ -146,7 +146,8 @@ def sized(
         if not len(own):
             continue
         with suppress(SpeciesError):
-            species = find(Kind.read(kind).species)
+            if (species := find(Kind.read(kind).species)) is None:
+                continue
             if Kind.read(kind).skeleton:  # it is as it was drawn
                 scale[own] *= measure_of(species).fitted(seeds.take(own), sizes.take(own))[0]
                 continue
@@ -237,7 +238,7 @@ def _crowded(species: Species, sizes: Sizes, number: int) -> Mask:
     height, width, base = (values[chosen] for values in (life.height, life.width, life.base))
     low = species.orders[0].branch_start.mean
     raised = (base <= 0.0) | (base > (low + _RAISED * BARE * (1.0 - low)) * height)
-    return raised & (width > 0.0) & (width * measure.height < _CROWDED * height * measure.width)
+    return raised & (width > 0.0) & (width * measure.height < CROWDED * height * measure.width)
 
 
 def _cohort_ages(species: Species, lives: Lives, number: int, full: float) -> Floats:

@@ -90,7 +90,7 @@ def test_only_plants_are_missed_in_renders_of_what_is_not_refined(scatter, monke
     monkeypatch.setattr(render, "_warn", lambda text, about: warned.append("shows no plants" in text))
     settings = scene().tetflora
     settings.refine_at_render = False
-    for expected in ("", "Nothing is refined, so renders show no plants"):
+    for expected in ("", "Not refined: renders show no plants"):
         assert has_contents(scene()) and has_plants(scene()) == bool(expected)
         assert refine.hint(scene()) == expected
         render.on_render_init(scene())

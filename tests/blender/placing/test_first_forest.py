@@ -190,7 +190,7 @@ def test_the_tab_says_what_comes_next_and_stops_when_it_is_done():
     assert not scene.tetflora.refine_at_render
     assert hint(scene) == ""  # what is kept is rendered
     bpy.data.collections.remove(bpy.data.collections["TetFlora kept"])
-    assert hint(scene) == "Nothing is refined, so renders show no plants"
+    assert hint(scene) == "Not refined: renders show no plants"
     bpy.ops.tetflora.remove_plants(which='ALL')
     assert hint(scene) == ""
 

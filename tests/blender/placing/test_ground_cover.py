@@ -4,6 +4,8 @@
 
 from __future__ import annotations
 
+import threading
+
 import bpy
 import numpy as np
 import pytest
@@ -16,6 +18,7 @@ from tetflora_addon.blender.placing.canopy import canopy_of
 from tetflora_addon.blender.placing.cover import MOST, cover_steps
 from tetflora_addon.blender.scene import fields
 from tetflora_addon.blender.species.edits import change_species, find_edit, species_for
+from tetflora_addon.compiled import recorded_sizes, sizes
 
 pytestmark = pytest.mark.usefixtures("clean_file")
 
@@ -189,7 +192,7 @@ def test_a_frozen_cover_is_refused_and_stays():
 
 
 def test_without_population_ground_or_plants_it_says_what_to_do():
-    with pytest.raises(RuntimeError, match="Add a layer first"):
+    with pytest.raises(RuntimeError, match="Click a Scatter or Cover layer first"):
         bpy.ops.tetflora.ground_cover()
     ground = _wood()
     for tree in [o for o in bpy.context.scene.objects if o.tetflora.is_plant]:
@@ -217,6 +220,34 @@ def test_closing_the_steps_leaves_everything_as_it_was(until):
     after = (len(_group().layers), len(bpy.data.objects), len(bpy.data.materials), len(bpy.data.images))
     assert after == before
     assert not _group().species_edits
+
+
+@pytest.mark.parametrize("renewed", [False, True])
+def test_crowns_of_a_stand_above_are_measured_beside_the_window(monkeypatch, renewed):
+    """They stopped it for nine seconds as a biome was added: species were found in a thread, their ages were not."""
+    ground = _wood()
+    _cover()
+    select(ground)
+    _group().stand.years, _group().stand.density = 12, 1000.0
+    assert bpy.ops.tetflora.grow_stand() == {'FINISHED'}
+    threads = set()
+
+    def noted(original):
+        def found(*given):
+            threads.add(threading.current_thread())
+            return original(*given)
+
+        return found
+
+    monkeypatch.setattr(sizes, "_known", {})
+    monkeypatch.setattr(sizes, "_crown_of", noted(sizes._crown_of))
+    monkeypatch.setattr(recorded_sizes.Measure, "fitted", noted(recorded_sizes.Measure.fitted))
+    scene = bpy.context.scene
+    steps = populations.make_plants_steps(scene, depsgraph(), _covers()[0])
+    if renewed:
+        steps = cover_steps(scene, depsgraph(), _group().layers[0])
+    assert len(list(steps)) > 1
+    assert threads and threading.main_thread() not in threads
 
 
 def test_a_cover_that_is_there_is_kept_where_its_renewal_is_stopped():

@@ -398,6 +398,6 @@ def test_results_say_what_has_changed_since_they_were_made():
     context = SimpleNamespace(region=region, **{name: getattr(bpy.context, name) for name in names})
     TETFLORA_PT_refine.draw(SimpleNamespace(layout=layout), context)
     said = " ".join(options.get("text", "") for name, _, options in layout.drawn if name == "label")
-    assert "Out of date: the camera, the day or year, settings changed" in said
+    assert "Out of date: the camera and more" in said
     bpy.ops.tetflora.refine()
     assert auto.changed_since(scene) == []

@@ -4,18 +4,26 @@
 
 from __future__ import annotations
 
+import ast
+import json
+from pathlib import Path
 from types import SimpleNamespace
 
+import blf
 import bpy
 import numpy as np
 import pytest
 
-from panels import refine
+from panels import outputs, refine
 from tests.blender.scenes import add_camera, add_mesh, add_plant, select
+from tetflora_addon import memory
 from tetflora_addon.blender import runtime
+from tetflora_addon.blender.biomes import layers
 from tetflora_addon.blender.compat import shader_tree
+from tetflora_addon.blender.job import forecast
 from tetflora_addon.blender.placing import populations
-from tetflora_addon.blender.viewport import warnings
+from tetflora_addon.blender.viewport import auto, warnings
+from tetflora_addon.emission.budget import Estimate
 
 pytestmark = pytest.mark.usefixtures("clean_file")
 
@@ -144,6 +152,48 @@ def test_grounds_that_are_small_or_scaled_are_mended():
     assert max(v.co.x for v in scaled.data.vertices) == pytest.approx(20.0)
 
 
+@pytest.mark.parametrize("stand", [False, True])
+def test_a_small_ground_is_mended_by_one_click_and_what_grows_on_it_is_due(stand):
+    """Its plants stand where they stood, in the middle of a bare ground, and Update said that nothing was to do."""
+    scene = bpy.context.scene
+    small = add_mesh("small", size=4.0)
+    select(small)
+    scene.tetflora.stand.years, scene.tetflora.stand.density = 2, 2000.0
+    made = bpy.ops.tetflora.grow_stand() if stand else bpy.ops.tetflora.populate(count=2, min_distance=1.0)
+    assert made == {'FINISHED'}
+    assert "small small" in _keys()
+    assert layers.due_layers(scene) == []
+    _mend("small small")
+    assert small.dimensions.x == pytest.approx(100.0)
+    assert tuple(small.scale) == (1.0, 1.0, 1.0)
+    assert "scale small" not in _keys()
+    assert len(layers.due_layers(scene)) == 1
+
+
+def test_nothing_that_the_panel_says_is_cut_in_a_sidebar_of_usual_width(monkeypatch):
+    """A mend read "Make 10...", and the memory of a forecast had no room; pixels are those of the window's sidebar."""
+    blf.size(0, 11.0)
+    calls = [node for node in ast.walk(ast.parse(Path(warnings.__file__).read_text())) if isinstance(node, ast.Call)]
+    given = [call.args for call in calls if getattr(call.func, "id", "") == "Warned"]
+    assert len(given) > 10
+    for _, short, _, *button in given:
+        assert blf.dimensions(0, f"{short.value} (+2)")[0] <= 110.0, short.value
+        assert all(blf.dimensions(0, one.value)[0] <= 58.0 for one in button[:1]), button[0].value
+    scene, layer = bpy.context.scene, bpy.context.view_layer
+    found = Estimate(1, 870_000.0, 1500.0, 13.2 * memory.GIGABYTE, False)
+    monkeypatch.setattr(forecast, "forecast", lambda *_: found)
+    add_camera()
+    said = [forecast.forecast_text(scene, layer), "Not refined: renders show no plants"]
+    for names in (["the day or year", "settings"], ["the day or year"], ["settings"]):
+        monkeypatch.setattr(auto, "changed_since", lambda _scene, names=names: names)
+        said.append(refine.state_of(scene))
+    coarse = {"polygons_meshed": 9e5, "polygons_proxy": 0, "coarser": "so", "facet_pixels": 1.3, "seconds": {}}
+    monkeypatch.setattr(outputs, "rows_of", lambda _text: True)
+    said.append(outputs.made_of(json.dumps(coarse)))
+    assert [text for text in said if blf.dimensions(0, text)[0] > 204.0] == []
+    assert all(said)
+
+
 def test_the_panel_has_one_line_whatever_is_wrong():
     from devtools.layouts import Layout
 
@@ -192,6 +242,15 @@ def test_an_animated_camera_stays_and_nothing_to_stand_on_is_told():
     bpy.ops.tetflora.look()
     assert bpy.context.scene.camera != camera
     assert tuple(camera.location) == (5.0, 0.0, 2.0)
+
+
+def test_a_mixed_wood_of_the_usual_density_is_dark_at_eye_height():
+    """A first wood on one's own ground rendered nearly black, and nothing was to mend."""
+    select(add_mesh("ground", size=50.0))
+    bpy.ops.tetflora.populate(count=200, species="beech:1, rowan:1, spruce:1")
+    bpy.ops.tetflora.daylight()
+    bpy.ops.tetflora.look()
+    assert _keys() == ["shade"]
 
 
 def test_a_closed_wood_is_dark_inside_until_it_is_brightened():

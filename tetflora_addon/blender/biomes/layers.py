@@ -16,7 +16,7 @@ from ..placing.populations import add_population
 from ..placing.rules import BIOME_ONLY, awaits_update, copy_settings, grounds_of, set_grounds
 from ..runtime import Handlers
 from ..scene.fields import has_history, stored_size
-from ..settings import BIOME, FIELD, SCATTER, active_in
+from ..settings import BIOME, FIELD, SCATTER, active_in, rules_of
 from ..stands.growing import stand_settings_now
 
 
@@ -186,7 +186,7 @@ def group_layer(scene: bpy.types.Scene) -> bool:
     if above and layers[index_of(scene, above[0])].kind == BIOME:
         _put_into(layer, above[0])
     else:
-        grounds = grounds_of(scene, layer.field.tetflora.stand if layer.kind == FIELD else layer)
+        grounds = grounds_of(scene, rules_of(layer))
         made = add_population(scene, grounds, name="Group")
         made.kind, made.limits, made.gives_way, group = BIOME, set(), False, made.uid
         for one in (*above, uid):
@@ -212,11 +212,6 @@ def _put_into(layer: Layer, group: str) -> None:
         layer.field.tetflora.stand.biome = group
 
 
-def order_of(scene: bpy.types.Scene) -> list[str]:
-    """Identities of all layers in their order."""
-    return [layer.uid for layer in scene.tetflora.layers]
-
-
 def _tidy(scene: bpy.types.Scene, active: str) -> None:
     """Let layers follow their biomes and groups."""
     sort_layers(scene, [uid for block in _blocks(scene.tetflora.layers) for uid in block], active)
@@ -224,7 +219,7 @@ def _tidy(scene: bpy.types.Scene, active: str) -> None:
 
 def sort_layers(scene: bpy.types.Scene, order: Sequence[str], active: str) -> None:
     """Bring the list into an order of identities."""
-    for place, uid in enumerate(order if list(order) != order_of(scene) else ()):
+    for place, uid in enumerate(order if list(order) != [one.uid for one in scene.tetflora.layers] else ()):
         scene.tetflora.layers.move(index_of(scene, uid), place)
     scene.tetflora.layers_index = index_of(scene, active)
 

@@ -15,12 +15,12 @@ from numpy.typing import NDArray
 
 from ... import memory
 from ...arrays import Floats, Integers
-from ...compiled.recorded_sizes import ages_of_heights
+from ...compiled.recorded_sizes import CROWDED, ages_of_heights, crowds
 from ...emission.budget import Estimate, Stand, estimate
 from ...errors import SpeciesError, TetFloraError
 from ...growth.seasons import PRESENT, expected_of
 from ...processes import pool
-from ...species.kinds import species_of
+from ...species.kinds import Kind, species_of
 from ..attributes import read, values_of
 from ..runtime import Handlers, Outlook, in_order
 from ..scene.ages import crown_kinds
@@ -81,6 +81,11 @@ def learn(expected: Estimate | None, seconds: float) -> None:
         _learned = float(np.clip(seconds / max(expected.seconds, 0.1), 0.1, 100.0))
 
 
+def seconds_here(expected: Estimate) -> float:
+    """Seconds that what is expected takes on this machine, as it took last."""
+    return expected.seconds * _learned
+
+
 def forecast_text(scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer) -> str:
     """``About 12 s, 4.1 M polygons, 2.5 GB``, and in a second line which limit holds; empty where nothing can be known.
 
@@ -94,8 +99,9 @@ def _text_for(scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer) -> str:
     if found is None:
         # Plants are there, and their crowns are being looked for.
         return "" if _counted.stand is not None or scene.camera is None else "Estimating…"
-    seconds = seconds_text(found.seconds * _learned)
-    text = f"About {seconds}, {polygons_text(found.primitives)}, {found.memory / _GIGA:.1f} GB"
+    size = found.memory / _GIGA
+    taken = seconds_text(seconds_here(found)), polygons_text(found.primitives), f"{size:.{int(size < 10.0)}f} GB"
+    text = f"About {', '.join(taken)}"
     if not found.limited:
         return text
     most = scene.tetflora.max_polygons
@@ -118,10 +124,10 @@ def seconds_text(seconds: float) -> str:
 
 
 def polygons_text(number: float) -> str:
-    """A number of polygons in two digits."""
-    if number >= _MEGA:
-        return f"{number / _MEGA:.2g} M polygons" if number < 10.0 * _MEGA else f"{number / _MEGA:,.0f} M polygons"
-    return f"{float(f'{number:.2g}'):,.0f} polygons"
+    """A number of polygons in two digits, and few letters: a sidebar has room for no more."""
+    number = float(f"{number:.2g}")
+    size, unit = (1.0, "") if number < 1e4 else (1e3, " k") if number < _MEGA else (_MEGA, " M")
+    return f"{number / size:,g}{unit} polygons"
 
 
 def _count(scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer) -> Stand | None:
@@ -216,7 +222,19 @@ def _field(scene: bpy.types.Scene, obj: bpy.types.Object, there: Integers) -> tu
         known = np.isfinite(tall) & (tall > 0.0)
         ages = np.where(known, _ages_of(scene, kinds, which, tall), ages)
         scale = np.where(known, own, scale)
-    return number, foot, *_aged(scene, scale, kinds, which, ages)
+    scale, species = _aged(scene, scale, kinds, which, ages)
+    wide = stored(obj.data, "tf_crown_width", chosen)
+    if tall is not None and wide is not None:
+        species = [_beside_others(scene, *one) for one in zip(species, tall.tolist(), wide.tolist(), strict=True)]
+    return number, foot, scale, species
+
+
+def _beside_others(scene: bpy.types.Scene, kind: str, tall: float, wide: float) -> str:
+    """The kind of a plant with a recorded height and width: with few leaves if its crown is as narrow as in a stand."""
+    one = Kind.read(kind)
+    crown = crown_to_draw(scene, one.species) if one.age and not one.dead else None
+    narrow = crown is not None and 0.0 < wide * crown.height < CROWDED * tall * 2.0 * crown.radius
+    return str(replace(one, crowded=True)) if narrow and crowds(species_for(scene, one.species)) else kind
 
 
 def _ages_of(scene: bpy.types.Scene, kinds: list[str], which: Integers, tall: NDArray[np.floating]) -> Floats:

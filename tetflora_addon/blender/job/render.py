@@ -107,7 +107,7 @@ def on_render_pre(scene: bpy.types.Scene, _depsgraph: object = None) -> None:
         if not made:
             in_main_thread(partial(_take_back, scene))
             if has_results(scene):
-                _raise(scene)
+                _rendering.raised.setdefault(scene.session_uid, {}).update(raise_settings(scene))
         _rendering.busy = False
 
 
@@ -202,7 +202,7 @@ def _make(scene: bpy.types.Scene) -> None:
         # Otherwise Blender crashes when it renders new objects in a layer that is not the window's, or for a sequencer.
         for layer in scene.view_layers:
             layer.update()
-    _raise(scene)
+    _rendering.raised.setdefault(scene.session_uid, {}).update(raise_settings(scene))
 
 
 def _layers_of(scene: bpy.types.Scene) -> list[list[bpy.types.ViewLayer]]:
@@ -228,10 +228,6 @@ def _take_back(scene: bpy.types.Scene) -> None:
     _rendering.raised.pop(scene.session_uid, None)
     frame_cache.clear(scene)
     refine.clear(scene, for_render=True)
-
-
-def _raise(scene: bpy.types.Scene) -> None:
-    _rendering.raised.setdefault(scene.session_uid, {}).update(raise_settings(scene))
 
 
 def _lower(scene: int) -> None:

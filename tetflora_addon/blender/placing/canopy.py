@@ -13,15 +13,19 @@ import bpy
 import numpy as np
 
 from ...arrays import Floats
+from ...compiled.recorded_sizes import sized
 from ...growth.seeds import BASE, LEAVES, WIDTH
+from ...jobs import Job, Progress
 from ...planting.cover import Canopy, Floor, Habitat, Sheet, Suits, mapping
 from ...species.kinds import species_of
 from ..attributes import world_matrix
-from ..scene.ages import crown_kinds, with_sizes
-from ..scene.crowns import crown_for
-from ..scene.fields import field_kinds, fields_of, read_aged_field, stored_ages
-from ..worker import run_to_end
+from ..scene.ages import crown_kinds, finder
+from ..scene.crowns import crown_for, crown_steps
+from ..scene.fields import fields_of, read_aged_field, stored_ages
+from ..worker import call_in_thread, run_to_end
 
+#: What stands over the ground, and the identifiers of its species.
+Above = tuple[Canopy, tuple[str, ...]]
 _kept: dict[str, Floor] = {}  # the last one, by content: settings change more often than the plants above
 
 
@@ -36,29 +40,33 @@ def not_of_covers(scene: bpy.types.Scene) -> list[bpy.types.Object]:
     return [o for o in scene.objects if o.tetflora.population not in covers] if covers else list(scene.objects)
 
 
-def canopy_of(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> tuple[Canopy, tuple[str, ...]]:
-    """What stands in a scene, and the identifiers of its species."""
+def canopy_of(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> Above:
+    """What stands in a scene."""
+    return run_to_end(canopy_steps(Progress(0.0, ""), scene, depsgraph))
+
+
+def canopy_steps(progress: Progress, scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> Job[Above]:
+    """The same as a job: plants are read at once, and measured in the background, as that may take seconds."""
     objects = not_of_covers(scene)
-    numbers: dict[str, int] = {}
-
-    def number_of(identifier: str) -> int:
-        return numbers.setdefault(identifier, len(numbers))
-
     single = [o for o in objects if o.tetflora.is_plant]
     places = np.array([np.array(o.matrix_world) for o in single], dtype=np.float64).reshape(-1, 4, 4)
     names = list(dict.fromkeys(o.tetflora.species for o in single))
     index = np.array([names.index(o.tetflora.species) for o in single], dtype=np.int32)
     scale = np.cbrt(np.abs(np.linalg.det(places[:, :3, :3])))
     parts = [(places[:, :3, 3], scale, None, *crown_kinds(scene, names, index, stored_ages(single)))]
-    for field in fields_of(objects):
-        read, ages = with_sizes(scene, *read_aged_field(field, depsgraph, world_matrix(field, depsgraph)[None]))
+    fields = [read_aged_field(o, depsgraph, world_matrix(o, depsgraph)[None]) for o in fields_of(objects)]
+    find = finder(scene, (kind for seeds, *_ in fields for kind in seeds.identifiers))
+    for read, ages in (yield from call_in_thread(progress, lambda: [sized(*one, find) for one in fields])):
         parts.append((read.position, read.scale, read.crown, *crown_kinds(scene, read.identifiers, read.species, ages)))
+    yield from crown_steps(progress, scene, {kind for _, _, _, kinds, *_ in parts for kind in kinds})
+    numbers: dict[str, int] = {}
     species, crowns = [], []
     for _, _, form, kinds, which, taller in parts:
         own = [crown_for(scene, kind) for kind in kinds]
         known = np.array([(c.radius, c.base, c.height, c.leaves) for c in own]).reshape(-1, 4)[which]
         crowns.append(_shaped(known, form) * taller[:, None] ** [1, 1, 1, 2])
-        species.append(np.array([number_of(species_of(kind)) for kind in kinds], dtype=np.int32)[which])
+        own = [numbers.setdefault(species_of(kind), len(numbers)) for kind in kinds]
+        species.append(np.array(own, dtype=np.int32)[which])
     position, size = (np.concatenate([part[i] for part in parts]) for i in (0, 1))
     radius, base, top, area = np.concatenate(crowns).T
     canopy = Canopy(position, radius * size, base * size, top * size, area * size**2, np.concatenate(species))
@@ -74,15 +82,6 @@ def _shaped(crowns: Floats, form: Floats | None) -> Floats:
     left = (top - higher) / np.maximum(top - base, 1e-9)
     leaves = area * form[:, WIDTH] * left * form[:, LEAVES]
     return np.stack([radius * form[:, WIDTH], higher, top, leaves], axis=1)
-
-
-def standing(scene: bpy.types.Scene) -> set[str]:
-    """Identifiers of the species that `canopy_of` will ask for, and of a few others perhaps."""
-    objects = not_of_covers(scene)
-    found = {o.tetflora.species for o in objects if o.tetflora.is_plant}
-    for field in fields_of(objects):
-        found.update(species_of(kind) for kind in field_kinds(field))
-    return found
 
 
 def floor_steps(canopy: Canopy, triangles: Floats, kinds: int) -> Generator[float, object, Floor]:
@@ -101,21 +100,21 @@ def floor_steps(canopy: Canopy, triangles: Floats, kinds: int) -> Generator[floa
 
 
 def read_suits(
-    depsgraph: bpy.types.Depsgraph, population: bpy.types.PropertyGroup, triangles: Floats, species: tuple[str, ...]
+    population: bpy.types.PropertyGroup, triangles: Floats, species: tuple[str, ...], above: Above | None
 ) -> Callable[[], dict[int, Suits]]:
     """What finds, without Blender, how suitable the ground (t, 3, 3) is for those species that do not grow anywhere."""
     wanted = {e.species: e for e in population.mix if e.habitat != 'ANYWHERE' and e.species in species}
-    if not wanted:
+    if above is None or not wanted:
         return dict
-    canopy, above = canopy_of(depsgraph.scene, depsgraph)
+    canopy, names = above
     asked = {
-        number: (Habitat[wanted[name].habitat], shedder_of(wanted[name], above), population.seed + number)
+        number: (Habitat[wanted[name].habitat], shedder_of(wanted[name], names), population.seed + number)
         for number, name in enumerate(species)
         if name in wanted
     }
 
     def suits() -> dict[int, Suits]:
-        floor = run_to_end(floor_steps(canopy, triangles, len(above)))
+        floor = run_to_end(floor_steps(canopy, triangles, len(names)))
         return {number: floor.suits(*one) for number, one in asked.items()}
 
     return suits

@@ -26,12 +26,12 @@ from ...species.litter import FALLEN, KIND, leaves_page, shed_share
 from ..materials.snow import add_snow
 from ..materials.soil import SHADED, lay_soil
 from ..runtime import JobData, job
-from ..scene.crowns import crown_for, crown_steps
+from ..scene.crowns import crown_for
 from ..settings import with_identity
 from ..species.edits import catalog, species_data, species_for, store_species
 from ..worker import steps_in_thread
 from . import distances, populations, rules, terrain
-from .canopy import canopy_of, floor_steps, is_cover, shedder_of, standing
+from .canopy import Above, canopy_steps, floor_steps, is_cover, shedder_of
 
 NAME, FALLEN_LEAVES = "Ground cover", "Fallen leaves"
 _SQUARE = 0.976  # mean square of the scales of a cover's plants
@@ -116,11 +116,10 @@ def cover_steps(
         It has no ground or no plants above it, or the cover is frozen; or something was deleted meanwhile.
     """
     scene, depsgraph, uid = data.scene, data.depsgraph, population.uid or ANYBODY
-    grounds = yield from _begun(data, population, grounds)
+    grounds, (canopy, above) = yield from _begun(data, population, grounds)
     population = _again(data, population, uid)
     own = {name: getattr(population, name) for name in terrain.MASKS} | dict(masks)
     ground = terrain.read_ground(grounds, depsgraph, **own)
-    canopy, above = canopy_of(scene, depsgraph)
     if not len(canopy):
         raise SceneError(f'"{population.name}" has no plants whose ground could be covered; click Update first')
     yield (progress := Progress(0.05, _UNDER))
@@ -147,8 +146,8 @@ def _begun(
     population: bpy.types.PropertyGroup,
     grounds: Iterable[bpy.types.Object] | None = None,
     fallen: bool = False,
-) -> Job[list[bpy.types.Object]]:
-    """See whether a population can have a cover, and measure what stands above; returns its ground, or that given."""
+) -> Job[tuple[list[bpy.types.Object], Above]]:
+    """See whether a population can have a cover, and measure what stands above; with its ground, or that given."""
     scene = data.scene
     yield (progress := Progress(0.0, _UNDER))
     found = cover_of(scene, population.uid or ANYBODY, fallen)
@@ -156,8 +155,7 @@ def _begun(
         populations.refuse_frozen(found)
     grounds = rules.checked_grounds(scene, population) if grounds is None else list(grounds)
     data.add_objects(grounds)
-    yield from crown_steps(progress, scene, standing(scene))
-    return grounds
+    return grounds, (yield from canopy_steps(progress, scene, data.depsgraph))
 
 
 def _again(data: JobData, population: bpy.types.PropertyGroup, uid: str) -> bpy.types.PropertyGroup:
@@ -303,10 +301,9 @@ def strew_steps(data: JobData, population: bpy.types.PropertyGroup) -> Job[popul
         It has no ground, or the leaves are frozen; or something was deleted meanwhile.
     """
     scene, depsgraph, uid = data.scene, data.depsgraph, population.uid or ANYBODY
-    grounds = yield from _begun(data, population, fallen=True)
+    grounds, (canopy, above) = yield from _begun(data, population, fallen=True)
     population = _again(data, population, uid)
     with populations.restored(scene):
-        canopy, above = canopy_of(scene, depsgraph)
         # Fallen leaves of each species: as many patches as have the area of what falls.
         parts = []
         for name in _shedders(canopy, above):

@@ -33,7 +33,7 @@ EYE_HEIGHT = 1.7  # meters
 SAMPLES = 24
 #: Attribute of the ground that is 0 on the path and 1 beside it.
 OFF_PATH = "off_path"
-_MARK = "tetflora_first_forest"  # on the collection, so that it may be renamed
+FIRST_FOREST = "tetflora_first_forest"  # on the collection, so that it may be renamed
 _STARTUP = {"Cube": 'MESH', "Camera": 'CAMERA', "Light": 'LIGHT'}
 _WEST, _EAST, _SOUTH, _NORTH = -48.0, 48.0, -14.0, 112.0  # of the ground, meters; the camera looks north
 _STEP = 2.0  # meters between the ground's vertices
@@ -117,7 +117,7 @@ def build(context: bpy.types.Context, seed: int) -> tuple[bpy.types.Scene, str]:
     default_species()
     scene, note = _scene_for(context)
     collection = bpy.data.collections.new(NAME)
-    collection[_MARK] = True
+    collection[FIRST_FOREST] = True
     scene.collection.children.link(collection)
     ground = _ground()
     collection.objects.link(ground)
@@ -150,11 +150,6 @@ def height(x: Floats, y: Floats) -> Floats:
 def path(y: Floats) -> Floats:
     """Where the middle of the path is, x by y, meters."""
     return 5.0 * np.sin(np.asarray(y, float) / 21.0)
-
-
-def is_first_forest(scene: bpy.types.Scene) -> bool:
-    """Whether a scene has a first forest; cheap."""
-    return any(_MARK in collection for collection in scene.collection.children)
 
 
 def is_startup(scene: bpy.types.Scene) -> bool:

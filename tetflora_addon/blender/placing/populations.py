@@ -29,7 +29,7 @@ from ..settings import BIOME, SCATTER, with_identity
 from ..species.edits import revert_species
 from ..worker import call_in_thread, run_to_end
 from . import plant_objects
-from .canopy import is_cover, standing
+from .canopy import canopy_steps, is_cover
 from .properties import MOST_EMPTIES, TetFloraLayer
 from .rules import copy_settings, fingerprint, makes_field, read_search, set_grounds
 
@@ -61,12 +61,6 @@ def adopt(scene: bpy.types.Scene, population: TetFloraLayer, objects: Iterable[b
     numbers = [o.tetflora.population_number for o in own_objects(scene, population)]
     for number, obj in enumerate(objects, max(numbers, default=-1) + 1):
         obj.tetflora.population, obj.tetflora.population_number = population.uid, number
-
-
-def recount(scene: bpy.types.Scene) -> None:
-    """Let populations know how many plants they still have, after some were removed."""
-    for population in scene.tetflora.layers:
-        population.made = own_number(own_objects(scene, population))
 
 
 def add_population(scene: bpy.types.Scene, grounds: Iterable[bpy.types.Object] = (), name: str = NAME) -> TetFloraLayer:
@@ -116,11 +110,10 @@ def make_plants_steps(data: JobData, population: TetFloraLayer) -> Job[PlacedPla
     species = {entry.species for entry in population.mix}
     measure_all(scene, depsgraph, species)
     kinds = {str(Kind(identifier, age=population.age)) for identifier in species}
-    if is_cover(population):
-        kinds |= standing(scene)
+    above = (yield from canopy_steps(progress, scene, depsgraph)) if is_cover(population) else None
     yield from crown_steps(progress, scene, kinds)
     population = still_there(data, uid)
-    search = read_search(scene, depsgraph, population, set(_sorted_out(scene, population)[0]))
+    search = read_search(scene, depsgraph, population, set(_sorted_out(scene, population)[0]), above=above)
     progress = Progress(0.1, "Looking for places")
     yield progress
     placement = yield from call_in_thread(progress, search.placement)

@@ -36,7 +36,7 @@ from ..scene.objects import objects_within
 from ..settings import BIOME, SCATTER, active_in, check_limits, with_identity
 from ..species.catalog import default_species
 from ..species.edits import catalog, unknown_text
-from .canopy import not_of_covers, read_suits
+from .canopy import Above, canopy_of, is_cover, not_of_covers, read_suits
 from .distances import HECTARE, distance_of, weights_of
 from .plant_objects import EMPTIES_UNASKED, plants_of
 from .terrain import MASKS, lines_within, read_ground
@@ -355,6 +355,7 @@ def read_search(
     own: Collection[bpy.types.Object],
     grounds: Sequence[bpy.types.Object] | None = None,
     most: int | None = None,
+    above: Above | None = None,
 ) -> Search:
     """Read what the places of a population's plants depend on.
 
@@ -366,6 +367,8 @@ def read_search(
         Meshes instead of the population's own.
     most : int, optional
         Upper limit of plants, for a preview.
+    above : Above, optional
+        What stands over the ground, if that was read already.
 
     Raises
     ------
@@ -383,7 +386,9 @@ def read_search(
     if most is not None:
         rules = replace(rules, count=min(rules.count, most))
     ground = read_ground(grounds, depsgraph, **{name: getattr(population, name) for name in MASKS})
-    suits = read_suits(depsgraph, population, ground.triangles, species)
+    if above is None and is_cover(population):
+        above = canopy_of(scene, depsgraph)
+    suits = read_suits(population, ground.triangles, species, above)
     present = standing(depsgraph, own, species)
     zones = read_zones(depsgraph, population, grounds)
     erased = (  # circles, as lines of one point

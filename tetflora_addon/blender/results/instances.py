@@ -302,18 +302,15 @@ def add_stand_in(
 def shows_itself(original: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> bool:
     """Whether an object has geometry that renders besides its instances."""
     instances = original.instance_type in {'VERTS', 'FACES', 'COLLECTION'} or len(original.particle_systems)
+    hair = any(system.settings.render_type == 'PATH' for system in original.particle_systems)
     if instances and not original.show_instancer_for_render:
-        return any(_is_hair(system) for system in original.particle_systems)
+        return hair
     geometry = geometry_of(original, depsgraph)
     if geometry is None:
         return len(getattr(original.data, "polygons", ())) > 0
     kinds = (("mesh", "polygons"), ("curves", "curves"), ("pointcloud", "points"))
     shown = any(len(getattr(getattr(geometry, kind), items, ())) for kind, items in kinds)
-    return shown or geometry.volume is not None or any(_is_hair(system) for system in original.particle_systems)
-
-
-def _is_hair(system: bpy.types.ParticleSystem) -> bool:
-    return system.settings.render_type == 'PATH'
+    return shown or geometry.volume is not None or hair
 
 
 def _is_simulated(original: bpy.types.Object) -> bool:

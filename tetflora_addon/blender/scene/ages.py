@@ -9,7 +9,7 @@ is full-grown where that is less, to when the last limbs of a dead plant have fa
 before. The years that pass in a scene are added afterward and change no class.
 """
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from contextlib import suppress
 from dataclasses import replace
 
@@ -64,6 +64,15 @@ def with_sizes(
 ) -> tuple[Seeds, Floats | None]:
     """Plants (n,) in their recorded sizes, if there are any, and the ages of all others."""
     return sized(seeds, ages, sizes, lambda identifier: species_for(scene, identifier))
+
+
+def finder(scene: bpy.types.Scene, kinds: Iterable[str]) -> Callable[[str], Species | None]:
+    """What finds the species of some kinds without Blender."""
+    known: dict[str, Species] = {}
+    for identifier in set(map(species_of, kinds)):
+        with suppress(SpeciesError):
+            known[identifier] = species_for(scene, identifier)
+    return known.get
 
 
 def class_ages(species: Species, years: Floats) -> Floats:

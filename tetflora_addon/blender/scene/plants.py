@@ -186,7 +186,7 @@ def _find_plants(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> _Fou
     copies = copies_of([o for o in objects if may_instance(o)], depsgraph)
     enabled = [c for c in copies if c.owner.tetflora.enabled]
     for c in enabled:
-        if _is_plant(c) and c.owner.tetflora.species not in assets:
+        if c.owner.tetflora.is_plant and c.geometry is None and c.owner.tetflora.species not in assets:
             given.append(Source(looks.of(c.owner, c.instancer), (c.owner.name, *_copied_plants(c))))
     for obj in own:
         if obj.tetflora.is_field and obj.tetflora.enabled:
@@ -202,10 +202,6 @@ def _find_plants(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> _Fou
         kinds = [seeds.identifiers[i] for i in np.flatnonzero(np.bincount(seeds.species)).tolist()]
         odd += [(name, own) for own in dict.fromkeys(map(species_of, kinds)) if own not in known]
     return _Found(sources, alike, odd, own, copies)
-
-
-def _is_plant(copies: Copies) -> bool:
-    return copies.owner.tetflora.is_plant and copies.geometry is None
 
 
 def _grown(part: Part, assets: Container[str]) -> Part:
@@ -266,7 +262,7 @@ def read_asset_plants(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) ->
         found.append(AssetPlants(species, (obj,), name_keys([obj]).view(np.int64), placed))
     copies = [c for c in copies_of([o for o in objects if may_instance(o)], depsgraph) if c.owner.tetflora.enabled]
     for c in copies:
-        if _is_plant(c) and c.owner.tetflora.species in assets:
+        if c.owner.tetflora.is_plant and c.geometry is None and c.owner.tetflora.species in assets:
             seed = child_key(key_of_seed(c.owner.tetflora.seed), c.keys).view(np.int64)
             found.append(AssetPlants(c.owner.tetflora.species, (c.owner,), seed, c.matrices))
     read = [(obj, world_matrix(obj, depsgraph)[None], None, None) for obj in fields]

@@ -62,11 +62,7 @@ def parts_of(editor: bpy.types.PropertyGroup) -> list[dict[str, Any]]:
 
 def present_order(editor: bpy.types.PropertyGroup) -> int:
     """Index among `parts_of` of what the sliders show."""
-    return _order_in(editor, parts_of(editor))
-
-
-def _order_in(editor: bpy.types.PropertyGroup, parts: list[dict[str, Any]]) -> int:
-    return max(min(editor.order_index, len(parts) - 1), 0)
+    return max(min(editor.order_index, len(parts_of(editor)) - 1), 0)
 
 
 def order_label(index: int, order: dict[str, Any], spur: bool = False) -> str:
@@ -88,7 +84,7 @@ def _count(value: Any) -> str:
 def value_of(editor: bpy.types.PropertyGroup, name: str) -> Any:
     """Value of a key of the shown order as JSON; the default if the file does not give it."""
     parts, key = parts_of(editor), ORDER_KEYS[name]
-    index = _order_in(editor, parts)
+    index = max(min(editor.order_index, len(parts) - 1), 0)
     if parts and name in parts[index]:
         return parts[index][name]
     try:

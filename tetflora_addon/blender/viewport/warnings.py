@@ -19,10 +19,12 @@ from ...species.kinds import species_of
 from ..job.forecast import stored
 from ..job.render import render_errors
 from ..placing.plant_objects import plants_of, positions
+from ..placing.rules import grounds_of
 from ..results.proxy_kinds import few_bounces
 from ..runtime import Outlook
 from ..scene.crowns import crown_to_draw
 from ..scene.fields import field_kinds, fields_of
+from ..settings import rules_of
 
 #: Wider ground is large enough for trees, meters.
 _SMALL = 10.0
@@ -30,6 +32,7 @@ _SIDE = 100.0  # of ground that was too small, meters
 #: Light of a world from all around that shows plants; a new file's gray is 0.05.
 _DARK = 0.1
 _NEAR = 20.0  # meters around the camera where crowns are looked at
+_CLOSED = 0.6  # of the sky there; half of a picture is nearly black from two thirds on, and well lit at one half
 _OVERHEAD = 3.0  # meters above the camera, where crowns shade it
 
 
@@ -62,7 +65,7 @@ def mend(scene: bpy.types.Scene, key: str) -> bool:
 def _look(scene: bpy.types.Scene) -> Iterator[Warned]:
     settings, camera = scene.tetflora, scene.camera
     for error in render_errors()[-1:]:
-        yield Warned("render", "Last render failed", error)
+        yield Warned("render", "Render failed", error)
     small, stretched = _grounds(scene)
     yield from small
     place = _places(scene)
@@ -115,25 +118,27 @@ def is_dark(scene: bpy.types.Scene) -> bool:
 
 def _grounds(scene: bpy.types.Scene) -> tuple[list[Warned], list[Warned]]:
     """Grounds of layers that are too small, and those whose scale is not applied."""
-    small: list[Warned] = []
-    stretched: list[Warned] = []
-    grounds = dict.fromkeys(e.object for layer in scene.tetflora.layers for e in layer.grounds if e.object is not None)
-    for obj in (o for o in grounds if scene in o.users_scene):
+    small, stretched = [], []
+    grounds = dict.fromkeys(obj for layer in scene.tetflora.layers for obj in grounds_of(scene, rules_of(layer)))
+    for obj in grounds:
         wide = max(obj.dimensions[:2])
         if 0.0 < wide < _SMALL:
-            text = (
-                f'"{obj.name}" is {wide:.3g} m wide, and trees are tens of meters tall. Scale it, or take a larger mesh'
-            )
-            small.append(Warned(f"small {obj.name}", "Small ground", text, "Make 100 m", partial(_enlarge, obj)))
+            text = f'"{obj.name}" is {wide:.3g} m wide; trees are tens of meters tall. Enlarge makes it 100 m'
+            small.append(Warned(f"small {obj.name}", "Small ground", text, "Enlarge", partial(_enlarge, obj)))
         elif obj.parent is None and obj.data.users == 1 and not np.allclose(obj.scale, 1.0, rtol=1e-3):
             text = f'The scale of "{obj.name}" is not applied: textures on it are stretched. Apply makes it 1'
-            stretched.append(Warned(f"scale {obj.name}", "Scale not applied", text, "Apply", partial(_apply, obj)))
+            stretched.append(Warned(f"scale {obj.name}", "Scale of ground", text, "Apply", partial(_apply, obj)))
     return small, stretched
 
 
-def _enlarge(obj: bpy.types.Object, _scene: bpy.types.Scene) -> None:
+def _enlarge(obj: bpy.types.Object, scene: bpy.types.Scene) -> None:
     factor = _SIDE / max(obj.dimensions[:2])
     obj.scale = [factor * value for value in obj.scale]
+    if obj.parent is None and obj.data.users == 1:
+        _apply(obj, scene)
+    for rules in map(rules_of, scene.tetflora.layers):
+        if obj in grounds_of(scene, rules):  # its plants stand in the middle: now it is due
+            setattr(rules, "grown_by" if hasattr(rules, "grown_by") else "placed_by", "elsewhere")
 
 
 def _apply(obj: bpy.types.Object, _scene: bpy.types.Scene) -> None:
@@ -184,7 +189,7 @@ def _camera(scene: bpy.types.Scene, place: Floats) -> Iterator[Warned]:
         text = f'"{camera.name}" is inside a crown: leaves fill the picture. Move takes it to the nearest open place'
         yield Warned("crown", "In a crown", text, "Move", _step_out)
     above = (sizes[:, 0] ** 2).sum(where=feet[:, 2] + sizes[:, 1] > at[2] + _OVERHEAD)
-    if above > _NEAR**2 and scene.view_settings.exposure == 0.0:
+    if above > _CLOSED * _NEAR**2 and scene.view_settings.exposure == 0.0:
         text = "The camera is in a closed wood, which is dark inside. Brighten raises Exposure in Color Management"
         yield Warned("shade", "Dark wood", text, "Brighten", _setter("view_settings.exposure", 2.5))
     text, most = cut_off(scene, place)
