@@ -12,7 +12,7 @@ from ...arrays import Floats
 from ...camera.camera import Camera
 from ...errors import SceneError
 from ..attributes import frames_of, moves, world_matrix
-from .motion import exposure, moment
+from .motion import displacements, exposure, moment
 
 _NARROW = 1e-9  # of windows that single precision turns into nothing
 #: Half of the angle of view below which a fisheye is no whole sphere, radians.
@@ -176,10 +176,9 @@ def _while_open(
     if not scene.render.use_motion_blur or not moves(scene.camera):
         return ()
     found = []
-    for frame in exposure(scene):
-        if math.isclose(frame, scene.frame_current_final, abs_tol=1e-6):
-            continue
-        with moment(frame):
+    frames = [f for f in exposure(scene) if not math.isclose(f, scene.frame_current_final, abs_tol=1e-6)]
+    for displaced in displacements(depsgraph, [scene.camera], frames):
+        with moment(displaced):
             other = _placed(camera, world_matrix(scene.camera, depsgraph).astype(np.float64), window)
         if other is not None:
             found.append(other)

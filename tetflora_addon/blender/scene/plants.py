@@ -29,7 +29,7 @@ from ..species.edits import catalog, edited_infos, species_for
 from .ages import Part, classed
 from .fields import read_aged_field, read_field_matrices, stored_ages
 from .looks import LayerLooks
-from .motion import exposure, moment
+from .motion import displacements, exposure, moment
 from .objects import Copies, copies_of, is_drop, may_instance, may_take_part, name_keys, renderable_objects
 from .skeletons import kind_of, kind_of_choice
 
@@ -83,16 +83,16 @@ def read_plants(
         the message names the objects.
     """
     read = partial(_read_plants, scene, depsgraph)
-    if not (scene.render.use_motion_blur and any(map(moves, filter(may_take_part, bpy.data.objects)))):
+    movers = scene.render.use_motion_blur and [o for o in bpy.data.objects if may_take_part(o) and moves(o)]
+    if not movers:
         return read()
     first, last = exposure(scene)
     seconds = (last - first) * scene.render.fps_base / scene.render.fps
-    with moment(first):
-        before, *_ = read()
-    with moment(last):
-        after, *_ = read()
-    with moment((first + last) / 2.0):
-        seeds, owners, unknown = read()
+    found = []
+    for displaced in displacements(depsgraph, movers, (first, last, (first + last) / 2.0)):
+        with moment(displaced):
+            found.append(read())
+    (before, *_), (after, *_), (seeds, owners, unknown) = found
     turned = after.frame @ before.frame.transpose(0, 2, 1)
     motion = np.concatenate([after.position - before.position, rotation_vectors(turned)], axis=1) / max(seconds, 1e-9)
     return replace(seeds, motion=motion) if motion.any() else seeds, owners, unknown
