@@ -431,10 +431,13 @@ def unpack_override_marks() -> None:
         del scene[OVERRIDES]
 
 
-def _not_evaluated(obj: bpy.types.Object) -> bool:
-    if not obj.hide_viewport or obj.hide_render or obj.type == 'EMPTY' or obj.library is not None or is_switched(obj):
-        return False
-    return may_take_part(obj) or obj.tetflora.is_occluder
+def _not_evaluated(scene: bpy.types.Scene, layer: bpy.types.ViewLayer) -> dict[bpy.types.Object, tuple[bool, bool]]:
+    """What renders but is disabled in viewports, or its collections are: whether it is itself, and its eye closed."""
+    disabled = [c for c in scene.collection.children_recursive if c.hide_viewport and not c.hide_render]
+    within = {o for c in disabled for o in c.all_objects}
+    off = [o for o in layer.objects if o.hide_viewport or (o in within and not o.visible_get(view_layer=layer))]
+    read = [o for o in off if (may_take_part(o) or o.tetflora.is_occluder) and o.type != 'EMPTY' and not o.hide_render]
+    return {o: (o.hide_viewport, o.hide_get(view_layer=layer)) for o in read if not is_switched(o)}
 
 
 @contextmanager
@@ -442,7 +445,7 @@ def originals_shown(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph | Non
     """Show objects that results of any scene hide as the artist left them, while the context lasts.
 
     The dependency graph is updated if it is given, which only evaluated data requires. What renders but is disabled in
-    viewports, which Blender evaluates nothing of, then has a closed eye instead.
+    viewports, which Blender evaluates nothing of, then has a closed eye instead, in a collection that is not disabled.
     """
     linked = [(scene, purpose, linked_hidden(scene, purpose)) for scene, purpose in scenes_hiding()]
     for home, purpose, _ in linked:
@@ -453,11 +456,15 @@ def originals_shown(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph | Non
         for o in every:
             o.hide_render, o.hide_viewport = _marker(o, purpose)[0]
     layer = getattr(depsgraph, "view_layer", None)
-    closed = {o: o.hide_get(view_layer=layer) for o in getattr(layer, "objects", ()) if _not_evaluated(o)}
+    closed = {} if layer is None else _not_evaluated(scene, layer)
+    shown = bpy.data.collections.new("shown") if closed else None
+    for o in closed:
+        shown.objects.link(o)
 
     def enable(on: bool) -> None:
-        for o, eye in closed.items():
-            o.hide_viewport = not on
+        (scene.collection.children.link if on else bpy.data.collections.remove)(shown)
+        for o, (off, eye) in closed.items():
+            o.hide_viewport = off and not on
             o.hide_set(on or eye, view_layer=layer)
 
     try:
