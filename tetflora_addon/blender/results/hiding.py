@@ -14,7 +14,6 @@ scene remembers all of it in a custom property.
 import json
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from functools import partial
 
 import bpy
 
@@ -448,35 +447,39 @@ def originals_shown(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph | Non
     viewports, which Blender evaluates nothing of, then has a closed eye instead, in a collection that is not disabled.
     """
     linked = [(scene, purpose, linked_hidden(scene, purpose)) for scene, purpose in scenes_hiding()]
-    for home, purpose, _ in linked:
-        show_linked(home, purpose)
-    marked = {purpose: _marked(purpose) for purpose in ('RENDER', 'VIEW')}
-    before = {o: (o.hide_render, o.hide_viewport) for every in marked.values() for o in every}
-    for purpose, every in marked.items():
-        for o in every:
+    marked = [(o, purpose) for purpose in ('RENDER', 'VIEW') for o in _marked(purpose)]
+    before = {o: (o.hide_render, o.hide_viewport) for o, _ in marked}
+    layer, closed, apart = getattr(depsgraph, "view_layer", None), {}, []
+
+    def show() -> None:
+        for home, purpose, _ in linked:
+            show_linked(home, purpose)
+        for o, purpose in marked:
             o.hide_render, o.hide_viewport = _marker(o, purpose)[0]
-    layer = getattr(depsgraph, "view_layer", None)
-    closed = {} if layer is None else _not_evaluated(scene, layer)
-    shown = bpy.data.collections.new("shown") if closed else None
-    for o in closed:
-        shown.objects.link(o)
+        closed.update({} if layer is None else _not_evaluated(scene, layer))
+        apart.extend([bpy.data.collections.new("shown")] if closed else [])
+        for collection in apart:
+            scene.collection.children.link(collection)
+        for o in closed:
+            apart[0].objects.link(o)
+            o.hide_viewport = False
+            o.hide_set(True, view_layer=layer)
 
-    def enable(on: bool) -> None:
-        (scene.collection.children.link if on else bpy.data.collections.remove)(shown)
+    def restore() -> None:
+        for collection in apart:
+            bpy.data.collections.remove(collection)
         for o, (off, eye) in closed.items():
-            o.hide_viewport = off and not on
-            o.hide_set(on or eye, view_layer=layer)
-
-    try:
-        if closed:
-            in_main_thread(partial(enable, True))
-        if (before or linked or closed) and layer is not None:
-            depsgraph.update()
-        yield
-    finally:
-        if closed:
-            in_main_thread(partial(enable, False))
+            o.hide_viewport = off
+            o.hide_set(eye, view_layer=layer)
         for o, flags in before.items():
             o.hide_render, o.hide_viewport = flags
         for home, purpose, every in reversed(linked):
             hide_linked(home, purpose, every)
+
+    try:
+        in_main_thread(show)
+        if (before or linked or closed) and layer is not None:
+            depsgraph.update()
+        yield
+    finally:
+        in_main_thread(restore)

@@ -7,9 +7,9 @@ and the scene that is read stays as it is. Only rigid bodies, which belong to th
 """
 
 import math
-from collections.abc import Iterable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable, Iterable, Iterator
 from functools import partial
+from typing import TypeVar
 
 import bpy
 import numpy as np
@@ -17,6 +17,8 @@ import numpy as np
 from ...arrays import Floats
 from .. import attributes
 from ..main_thread import in_main_thread
+
+_Seen = TypeVar("_Seen")
 
 
 def exposure(scene: bpy.types.Scene) -> tuple[float, float]:
@@ -40,23 +42,19 @@ def curves_of(datablock: bpy.types.ID) -> Iterator[bpy.types.FCurve]:
     return (curve for bag in bags_of(datablock) for curve in bag.fcurves)
 
 
-@contextmanager
-def moment(displacements: dict[int, Floats]) -> Iterator[None]:
-    """Let `attributes.world_matrix` tell where objects are at another frame, while the context lasts."""
-    attributes.elsewhere = displacements
+def at_moments(
+    depsgraph: bpy.types.Depsgraph, movers: list[bpy.types.Object], frames: Iterable[float], look: Callable[[], _Seen]
+) -> list[_Seen]:
+    """What a function finds at each of some frames, where `attributes.world_matrix` tells where movers are then."""
+    now, *others = in_main_thread(partial(_placed, depsgraph, movers, (depsgraph.scene.frame_current_final, *frames)))
+    back, found = np.linalg.pinv(now), []
     try:
-        yield
+        for then in others:
+            attributes.elsewhere = dict(zip((obj.session_uid for obj in movers), then @ back, strict=True))
+            found.append(look())
     finally:
         attributes.elsewhere = {}
-
-
-def displacements(
-    depsgraph: bpy.types.Depsgraph, movers: list[bpy.types.Object], frames: Iterable[float]
-) -> list[dict[int, Floats]]:
-    """For each frame matrices (4, 4), by `session_uid`, that take objects from where they are now to there."""
-    now, *others = in_main_thread(partial(_placed, depsgraph, movers, (depsgraph.scene.frame_current_final, *frames)))
-    back = np.linalg.pinv(now)
-    return [{obj.session_uid: m for obj, m in zip(movers, then @ back, strict=True)} for then in others]
+    return found
 
 
 def _placed(depsgraph: bpy.types.Depsgraph, movers: list[bpy.types.Object], frames: Iterable[float]) -> list[Floats]:

@@ -29,7 +29,7 @@ from ..species.edits import catalog, edited_infos, species_for
 from .ages import Part, classed
 from .fields import read_aged_field, read_field_matrices, stored_ages
 from .looks import LayerLooks
-from .motion import displacements, exposure, moment
+from .motion import at_moments, exposure
 from .objects import Copies, copies_of, is_drop, may_instance, may_take_part, name_keys, renderable_objects
 from .skeletons import kind_of, kind_of_choice
 
@@ -88,10 +88,7 @@ def read_plants(
         return read()
     first, last = exposure(scene)
     seconds = (last - first) * scene.render.fps_base / scene.render.fps
-    found = []
-    for displaced in displacements(depsgraph, movers, (first, last, (first + last) / 2.0)):
-        with moment(displaced):
-            found.append(read())
+    found = at_moments(depsgraph, movers, (first, last, (first + last) / 2.0), read)
     (before, *_), (after, *_), (seeds, owners, unknown) = found
     turned = after.frame @ before.frame.transpose(0, 2, 1)
     motion = np.concatenate([after.position - before.position, rotation_vectors(turned)], axis=1) / max(seconds, 1e-9)
