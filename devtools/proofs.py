@@ -7,7 +7,8 @@
 
 A test that comes with a mend has to fail without it. The commit's ``tests`` are laid over the code of its parent, in
 a worktree beside this one, and each test gets a line: ``fails``, as it should, or ``passes``. Commits that leave the
-product alone are left out: of these the tests pass before, too. Tests of a full Blender run where ``BLENDER`` is set.
+product alone, but for pictures, are left out: of these the tests pass before, too. Tests of a full Blender run where
+``BLENDER`` is set.
 
 Some tests that pass are right to: they guard what was never wrong, or follow another name. ``proofs.json`` says of each
 what shows that there was no fault; it gets a line with that, ``guards``. One that fails there is told, too: its reason
@@ -32,7 +33,7 @@ ROOT = Path(__file__).resolve().parent.parent
 FULL = ("tests/full/", "tests/window/")
 #: Commits, and of each the tests without a fault before it: what shows that.
 GUARDS = Path(__file__).with_suffix(".json")
-NOT_CODE = (":!tests", ":!docs", ":!*.md", ":!.ci", ":!Makefile", ":!pyproject.toml")
+NOT_CODE = (":!tests", ":!docs", ":!*.md", ":!*.png", ":!*.exr", ":!.ci", ":!Makefile", ":!pyproject.toml")
 
 
 def _git(root: Path, *arguments: str) -> str:

@@ -70,6 +70,15 @@ def test_a_changed_test_is_one(repository: Path) -> None:
     assert proofs.changed_tests(repository, "HEAD") == ["tests/engine/test_a.py::test_c"]
 
 
+def test_pictures_are_no_code(repository: Path) -> None:
+    """A test that comes with a picture alone has nothing to fail on."""
+    (repository / "reference.exr").write_bytes(b"picture")
+    (repository / "tests" / "engine" / "test_f.py").write_text("def test_f():\n    pass\n", encoding="utf-8")
+    for command in (("add", "-A"), ("commit", "-qm", "picture")):
+        subprocess.run(("git", *command), cwd=repository, check=True, capture_output=True)
+    assert list(proofs.proofs(repository, "HEAD~1")) == []
+
+
 def test_without_a_tag_it_is_the_last_commit(repository: Path) -> None:
     assert proofs.last_tag(repository) == "HEAD~1"
     subprocess.run(("git", "tag", "1.0"), cwd=repository, check=True)

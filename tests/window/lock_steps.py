@@ -38,6 +38,14 @@ def steps(ui):
     sheet = add_mesh("sheet")  # enabled for a moment while each frame is read
     sheet.modifiers.new("array", 'ARRAY').count = 4
     sheet.tetflora.is_explicit = sheet.hide_viewport = True
+    # As its collection is; and a plant moves by a constraint, for which it is evaluated in a scene of its own.
+    home = bpy.data.collections.new("home")
+    scene.collection.children.link(home)
+    home.objects.link(sheet)
+    scene.collection.objects.unlink(sheet)
+    home.hide_viewport = scene.render.use_motion_blur = True
+    follows = bpy.data.objects["p0"].constraints.new('COPY_LOCATION')
+    follows.target, follows.use_y, follows.use_z = scene.camera, False, False
     refine.refine(scene, bpy.context.evaluated_depsgraph_get())  # results hide it
     seen, original = [], refine.refine
 
@@ -45,6 +53,7 @@ def steps(ui):
         found = original(*given, **named)
         seen.append((threading.current_thread() is threading.main_thread(), main_thread.window_draws()))
         ui.values["meshes"] = named["given"].explicit.meshes.faces
+        ui.values["moving"] = int((abs(named["given"].seeds.motion[:, 0]) > 1.0).sum())
         return found
 
     refine.refine = watched
@@ -59,6 +68,7 @@ def steps(ui):
         bpy.app.handlers.render_complete.remove(end)
         ui.values["locked" if locked else "unlocked"] = [*seen, render.render_errors()]
     ui.values["disabled"] = *hiding.artists_flags(sheet), sheet.hide_get()
+    ui.values["scenes"] = len(bpy.data.scenes), len(bpy.data.collections["home"].objects)
     ui.values["timers_at_end"] = bpy.app.timers.is_registered(main_thread.make_changes)
     addon_utils.disable(INSTALLED)  # and not in the preferences, which other tests share
     ui.values["timer_after"] = bpy.app.timers.is_registered(main_thread.make_changes)

@@ -25,3 +25,8 @@ def test_one_timer_lives_as_long_as_the_extension(seen: dict) -> None:
 def test_meshes_that_are_disabled_in_viewports_render_with_their_modifiers(seen: dict) -> None:
     assert seen["meshes"] == 4
     assert seen["disabled"] == [False, True, False]
+
+
+def test_what_moves_is_evaluated_in_a_scene_that_is_gone_afterward(seen: dict) -> None:
+    assert seen["moving"] == 1
+    assert seen["scenes"] == [1, 1]

@@ -7,7 +7,7 @@ Attributes of meshes, point clouds and hair curves are plain memory, read and wr
 empty, it still returns what there was when the mode was entered.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import NamedTuple
 
@@ -118,18 +118,18 @@ def empty(kind: AttributeType, size: int) -> NDArray:
     return np.zeros(size if kind.width == 1 else (size, kind.width), kind.dtype)
 
 
-#: While somebody asks for another moment: matrices (4, 4) that take objects from where they are now to where they are
-#: then, see `scene.motion`.
-elsewhere: Callable[[bpy.types.Object, bpy.types.Depsgraph], Floats] | None = None
+#: While somebody asks for another moment: matrices (4, 4) that take objects, by `session_uid`, from where they are now
+#: to where they are then, see `scene.motion`.
+elsewhere: dict[int, Floats] = {}
 
 
 def world_matrix(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Floats:
-    """As `matrix_now`, or at another moment while somebody asks for that."""
-    matrix = matrix_now(obj, depsgraph)
-    return matrix if elsewhere is None else elsewhere(obj, depsgraph) @ matrix
+    """As `_matrix_now`, or at another moment while somebody asks for that."""
+    matrix = _matrix_now(obj, depsgraph)
+    return elsewhere[obj.session_uid] @ matrix if obj.session_uid in elsewhere else matrix
 
 
-def matrix_now(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Floats:
+def _matrix_now(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Floats:
     """An object's evaluated matrix in world space, (4, 4); float32 in some versions of Blender.
 
     Objects that are disabled in viewports but render are not evaluated, and their stored matrix may be old. Then it
@@ -140,16 +140,16 @@ def matrix_now(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Floats:
         return np.array(evaluated.matrix_world)
     own = np.array(obj.matrix_basis)
     parent = obj.parent
-    return own if parent is None else matrix_now(parent, depsgraph) @ np.array(obj.matrix_parent_inverse) @ own
+    return own if parent is None else _matrix_now(parent, depsgraph) @ np.array(obj.matrix_parent_inverse) @ own
 
 
 def moves(obj: bpy.types.Object | None) -> bool:
-    """Whether an action moves an object or one of its parents, and motion blur is on for it."""
+    """Whether anything may move an object or one of its parents, and motion blur is on for it."""
     if obj is not None and not getattr(getattr(obj, "cycles", None), "use_motion_blur", True):
         return False
     while obj is not None:
         animation = obj.animation_data
-        if animation is not None and animation.action is not None and animation.action_slot is not None:
+        if len(obj.constraints) or (animation and (animation.action or animation.nla_tracks or animation.drivers)):
             return True
         obj = obj.parent
     return False

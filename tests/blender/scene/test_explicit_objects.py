@@ -401,13 +401,22 @@ def test_the_operator_marks_and_unmarks():
         bpy.ops.tetflora.mark(what='EXPLICIT')
 
 
+@pytest.mark.parametrize("what", ["mesh", "collection", "outer collection"])
 @pytest.mark.parametrize("fails", [False, True])
-def test_what_is_disabled_in_viewports_has_its_modifiers(fails):
+def test_what_is_disabled_in_viewports_has_its_modifiers(fails, what):
     """As renders show it; afterward it is disabled, and its eye as it was. Viewports do not show results either."""
     scene = _scene()
+    outer, inner = (bpy.data.collections.new(name) for name in ("outer", "inner"))
+    scene.collection.children.link(outer)
+    outer.children.link(inner)
     sheet = add_mesh("sheet")
+    inner.objects.link(sheet)
+    scene.collection.objects.unlink(sheet)
     sheet.modifiers.new("array", 'ARRAY').count = 5
-    sheet.tetflora.is_explicit = sheet.hide_viewport = True
+    sheet.tetflora.is_explicit = True
+    disabled = {"mesh": sheet, "collection": inner, "outer collection": outer}[what]
+    disabled.hide_viewport = True
+    before = datablocks()
     if fails:
         sheet.matrix_world[0][3] = float("nan")
         with pytest.raises(errors.SceneError):
@@ -417,7 +426,12 @@ def test_what_is_disabled_in_viewports_has_its_modifiers(fails):
         made = _made(scene)
         assert made and all(o.hide_viewport and not o.hide_render for o in made)
         refine.clear(scene)
-    assert (sheet.hide_viewport, sheet.hide_render, sheet.hide_get()) == (True, False, False)
+    assert datablocks() == before or not fails
+    assert [one.hide_viewport for one in (sheet, inner, outer)] == [one is disabled for one in (sheet, inner, outer)]
+    assert not sheet.visible_get()
+    disabled.hide_viewport = False
+    assert (sheet.hide_render, sheet.hide_get(), sheet.visible_get()) == (False, False, True)
+    assert sheet.users_collection == (inner,)
 
 
 def test_plants_that_a_mesh_instances_render_where_it_is_disabled_in_viewports():
@@ -435,8 +449,22 @@ def test_plants_that_a_mesh_instances_render_where_it_is_disabled_in_viewports()
     home.objects.link(ground)
     home.hide_viewport = True
     refine.clear(scene)
-    with pytest.raises(errors.SceneError, match='"ground": disabled in viewports, so its instances are unknown'):
-        _refine(scene)
+    assert _refine(scene).plants == 4
+    refine.clear(scene)
     home.hide_viewport = False
     bpy.context.view_layer.layer_collection.children["home"].hide_viewport = True  # the eye
     assert _refine(scene).plants == 4
+
+
+def test_what_is_linked_and_disabled_in_its_file_shows_its_instances(tmp_path):
+    scene, path = _scene(), str(tmp_path / "ground.blend")
+    ground = scattered(add_plant("source", collection=bpy.data.collections.new("apart")), 4)
+    ground.tetflora.is_scatter, ground.hide_viewport = False, True
+    bpy.data.libraries.write(path, {ground})
+    bpy.data.batch_remove([ground, bpy.data.objects["source"]])
+    with bpy.data.libraries.load(path, link=True) as (_, wanted):
+        wanted.objects = ["ground"]
+    linked = wanted.objects[0]
+    scene.collection.objects.link(linked)
+    assert _refine(scene).plants == 4
+    assert linked.hide_viewport and not linked.visible_get() and linked.users_collection == (scene.collection,)

@@ -8,7 +8,7 @@ import bpy
 import numpy as np
 import pytest
 
-from tests.blender.scenes import add_camera, add_mesh, add_plant, depsgraph, tiny_render
+from tests.blender.scenes import add_camera, add_mesh, add_plant, datablocks, depsgraph, tiny_render
 from tetflora_addon.blender.assets.marks import use_as_species
 from tetflora_addon.blender.attributes import read
 from tetflora_addon.blender.job import refine
@@ -81,10 +81,45 @@ def within_a_collection_instance(scene, **how):
     scene.collection.objects.link(shown)
 
 
-WAYS = (directly, by_a_parent, in_a_field, as_a_collection_instance, within_a_collection_instance)
+def _moving_target(scene, **how):
+    target = bpy.data.objects.new("target", None)
+    scene.collection.objects.link(target)
+    animated(target, **how)
+    return target
 
 
-@pytest.mark.parametrize("way", WAYS)
+def by_a_constraint(scene, **how):
+    add_plant().constraints.new('COPY_TRANSFORMS').target = _moving_target(scene, **how)
+
+
+def by_a_constraint_of_what_viewports_do_not_show(scene, **how):
+    by_a_constraint(scene, **how)
+    bpy.data.objects["plant"].hide_viewport = True
+
+
+def by_a_driver(scene, **how):
+    driver = add_plant().driver_add("location", 0).driver
+    driver.type = 'SUM'
+    target = driver.variables.new()
+    target.type = 'TRANSFORMS'
+    target.targets[0].id = _moving_target(scene, **how)
+    target.targets[0].transform_type = 'LOC_X'
+
+
+def in_the_nla(scene, **how):
+    plant = add_plant()
+    animated(plant, **how)
+    data = plant.animation_data
+    strip = data.nla_tracks.new().strips.new("strip", 0, data.action)
+    strip.action_slot, strip.extrapolation = data.action_slot, 'HOLD'
+    data.action = None
+
+
+SIMPLE = (directly, by_a_parent, in_a_field, as_a_collection_instance, within_a_collection_instance)
+OTHERS = (by_a_constraint, by_a_constraint_of_what_viewports_do_not_show, by_a_driver, in_the_nla)
+
+
+@pytest.mark.parametrize("way", (*SIMPLE, *OTHERS))
 @pytest.mark.parametrize("position", ['START', 'CENTER', 'END'])
 def test_plants_have_the_motion_of_what_moves_them(scene, way, position):
     scene.render.motion_blur_position = position
@@ -93,6 +128,30 @@ def test_plants_have_the_motion_of_what_moves_them(scene, way, position):
     assert seeds.motion == pytest.approx(np.array([[PACE * RATE, 0, 0, 0, 0, 0]]), abs=1e-3)
     middle = {'START': 0.5, 'CENTER': 0.0, 'END': -0.5}[position]
     assert seeds.position == pytest.approx(np.array([[PACE * middle, 0, 0]]), abs=1e-4)
+
+
+@pytest.mark.parametrize("way", (directly, *OTHERS))
+def test_who_asks_for_motion_changes_nothing(scene, way):
+    scene.render.motion_blur_position = 'START'
+    way(scene)
+    told, graph = [], depsgraph()
+    for handlers in (bpy.app.handlers.depsgraph_update_post, bpy.app.handlers.frame_change_post):
+        handlers.append(lambda scene, depsgraph=None: told.append(scene.name))
+    moving = bpy.data.objects.get("target", bpy.data.objects["plant"])
+
+    def state():
+        return (
+            datablocks(),
+            scene.frame_current_final,
+            [o.matrix_world.copy() for o in scene.objects],
+            moving.location[:],
+        )
+
+    before = state()
+    assert read_plants(scene, graph)[0].motion is not None
+    assert state() == before
+    bpy.context.view_layer.update()
+    assert not told
 
 
 def test_a_plant_that_turns_about_its_parent_has_both_motions(scene):
@@ -167,6 +226,13 @@ def test_a_camera_moved_by_its_parent_is_read_while_its_shutter_is_open(scene):
     scene.collection.objects.link(parent)
     scene.camera.parent = parent
     animated(parent)
+    camera = read_camera(scene, depsgraph())
+    assert [round(float(other.position[0]), 4) for other in camera.shutter] == [-PACE / 2, PACE / 2]
+
+
+def test_a_camera_on_a_path_is_read_while_its_shutter_is_open(scene):
+    scene.camera.location = (0.0, 0.0, 0.0)
+    scene.camera.constraints.new('COPY_LOCATION').target = _moving_target(scene)
     camera = read_camera(scene, depsgraph())
     assert [round(float(other.position[0]), 4) for other in camera.shutter] == [-PACE / 2, PACE / 2]
 

@@ -82,11 +82,17 @@ def test_nothing_is_done_where_nothing_has_changed(scene, monkeypatch):
     assert results(scene) == [made]
 
 
-def test_it_comes_to_rest_where_a_mesh_is_disabled_in_viewports(scene, monkeypatch):
+@pytest.mark.parametrize("what", ["mesh", "collection"])
+def test_it_comes_to_rest_where_a_mesh_is_disabled_in_viewports(scene, monkeypatch, what):
     """To read it, it is enabled for a moment: nothing has changed thereby."""
-    sheet = add_mesh("sheet")
+    sheet, home = add_mesh("sheet"), bpy.data.collections.new("home")
+    scene.collection.children.link(home)
+    home.objects.link(sheet)
+    scene.collection.objects.unlink(sheet)
     sheet.modifiers.new("array", 'ARRAY').count = 3
-    sheet.tetflora.is_explicit = sheet.hide_viewport = True
+    sheet.tetflora.is_explicit = True
+    disabled = sheet if what == "mesh" else home
+    disabled.hide_viewport = True
     bpy.context.view_layer.update()
     scene.tetflora.auto_refine = True
     assert settle(monkeypatch) > 5
@@ -94,7 +100,9 @@ def test_it_comes_to_rest_where_a_mesh_is_disabled_in_viewports(scene, monkeypat
     changed(scene)
     assert settle(monkeypatch) == 0
     assert results(scene) == [made]
-    assert sheet.hide_viewport and not sheet.hide_get()
+    bpy.context.view_layer.update()
+    assert settle(monkeypatch) == 0
+    assert disabled.hide_viewport and not sheet.hide_get() and sheet.users_collection == (home,)
 
 
 @pytest.mark.parametrize("change", ["camera", "plant", "cutoff", "seed", "new", "form"])

@@ -14,7 +14,6 @@ scene remembers all of it in a custom property.
 import json
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from functools import partial
 
 import bpy
 
@@ -431,10 +430,13 @@ def unpack_override_marks() -> None:
         del scene[OVERRIDES]
 
 
-def _not_evaluated(obj: bpy.types.Object) -> bool:
-    if not obj.hide_viewport or obj.hide_render or obj.type == 'EMPTY' or obj.library is not None or is_switched(obj):
-        return False
-    return may_take_part(obj) or obj.tetflora.is_occluder
+def _not_evaluated(scene: bpy.types.Scene, layer: bpy.types.ViewLayer) -> dict[bpy.types.Object, tuple[bool, bool]]:
+    """What renders but is disabled in viewports, or its collections are: whether it is itself, and its eye closed."""
+    disabled = [c for c in scene.collection.children_recursive if c.hide_viewport and not c.hide_render]
+    within = {o for c in disabled for o in c.all_objects}
+    off = [o for o in layer.objects if o.hide_viewport or (o in within and not o.visible_get(view_layer=layer))]
+    read = [o for o in off if (may_take_part(o) or o.tetflora.is_occluder) and o.type != 'EMPTY' and not o.hide_render]
+    return {o: (o.hide_viewport, o.hide_get(view_layer=layer)) for o in read if not is_switched(o)}
 
 
 @contextmanager
@@ -442,34 +444,42 @@ def originals_shown(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph | Non
     """Show objects that results of any scene hide as the artist left them, while the context lasts.
 
     The dependency graph is updated if it is given, which only evaluated data requires. What renders but is disabled in
-    viewports, which Blender evaluates nothing of, then has a closed eye instead.
+    viewports, which Blender evaluates nothing of, then has a closed eye instead, in a collection that is not disabled.
     """
     linked = [(scene, purpose, linked_hidden(scene, purpose)) for scene, purpose in scenes_hiding()]
-    for home, purpose, _ in linked:
-        show_linked(home, purpose)
-    marked = {purpose: _marked(purpose) for purpose in ('RENDER', 'VIEW')}
-    before = {o: (o.hide_render, o.hide_viewport) for every in marked.values() for o in every}
-    for purpose, every in marked.items():
-        for o in every:
+    marked = [(o, purpose) for purpose in ('RENDER', 'VIEW') for o in _marked(purpose)]
+    before = {o: (o.hide_render, o.hide_viewport) for o, _ in marked}
+    layer, closed, apart = getattr(depsgraph, "view_layer", None), {}, []
+
+    def show() -> None:
+        for home, purpose, _ in linked:
+            show_linked(home, purpose)
+        for o, purpose in marked:
             o.hide_render, o.hide_viewport = _marker(o, purpose)[0]
-    layer = getattr(depsgraph, "view_layer", None)
-    closed = {o: o.hide_get(view_layer=layer) for o in getattr(layer, "objects", ()) if _not_evaluated(o)}
+        closed.update({} if layer is None else _not_evaluated(scene, layer))
+        apart.extend([bpy.data.collections.new("shown")] if closed else [])
+        for collection in apart:
+            scene.collection.children.link(collection)
+        for o in closed:
+            apart[0].objects.link(o)
+            o.hide_viewport = False
+            o.hide_set(True, view_layer=layer)
 
-    def enable(on: bool) -> None:
-        for o, eye in closed.items():
-            o.hide_viewport = not on
-            o.hide_set(on or eye, view_layer=layer)
-
-    try:
-        if closed:
-            in_main_thread(partial(enable, True))
-        if (before or linked or closed) and layer is not None:
-            depsgraph.update()
-        yield
-    finally:
-        if closed:
-            in_main_thread(partial(enable, False))
+    def restore() -> None:
+        for collection in apart:
+            bpy.data.collections.remove(collection)
+        for o, (off, eye) in closed.items():
+            o.hide_viewport = off
+            o.hide_set(eye, view_layer=layer)
         for o, flags in before.items():
             o.hide_render, o.hide_viewport = flags
         for home, purpose, every in reversed(linked):
             hide_linked(home, purpose, every)
+
+    try:
+        in_main_thread(show)
+        if (before or linked or closed) and layer is not None:
+            depsgraph.update()
+        yield
+    finally:
+        in_main_thread(restore)

@@ -12,7 +12,7 @@ from ...arrays import Floats
 from ...camera.camera import Camera
 from ...errors import SceneError
 from ..attributes import frames_of, moves, world_matrix
-from .motion import exposure, moment
+from .motion import at_moments, exposure
 
 _NARROW = 1e-9  # of windows that single precision turns into nothing
 #: Half of the angle of view below which a fisheye is no whole sphere, radians.
@@ -174,14 +174,12 @@ def _while_open(
     """The camera when the shutter opens and closes, if motion blur is on and it is animated; see `motion`."""
     if not scene.render.use_motion_blur or not moves(scene.camera):
         return ()
-    found = []
-    for frame in exposure(scene):
-        if math.isclose(frame, scene.frame_current_final, abs_tol=1e-6):
-            continue
-        with moment(frame):
-            other = _placed(camera, world_matrix(scene.camera, depsgraph).astype(np.float64), window)
-        if other is not None:
-            found.append(other)
+    frames = [f for f in exposure(scene) if not math.isclose(f, scene.frame_current_final, abs_tol=1e-6)]
+
+    def look() -> Camera | None:
+        return _placed(camera, world_matrix(scene.camera, depsgraph).astype(np.float64), window)
+
+    found = [other for other in at_moments(depsgraph, [scene.camera], frames, look) if other is not None]
     moving = any(
         not (np.allclose(o.position, camera.position, atol=1e-6) and np.allclose(o.frame, camera.frame, atol=1e-7))
         for o in found

@@ -2,23 +2,23 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Where objects are while the shutter is open.
 
-Nothing is evaluated and the scene does not change: only curves of actions of objects and of their parents are read at
-other times; what constraints, drivers, simulations and the NLA do stays as it is now.
+Blender evaluates what moves at other times in a scene of its own, which nobody sees: whatever moves an object counts,
+and the scene that is read stays as it is. Only rigid bodies, which belong to their scene, stand still there.
 """
 
-from collections.abc import Iterator
-from contextlib import contextmanager
+import math
+from collections.abc import Callable, Iterable, Iterator
 from functools import partial
+from typing import TypeVar
 
 import bpy
 import numpy as np
-from mathutils import Euler, Matrix, Quaternion
 
 from ...arrays import Floats
 from .. import attributes
+from ..main_thread import in_main_thread
 
-#: Paths of animation that place an object, and how many values each has.
-_CHANNELS = {"location": 3, "rotation_euler": 3, "rotation_quaternion": 4, "rotation_axis_angle": 4, "scale": 3}
+_Seen = TypeVar("_Seen")
 
 
 def exposure(scene: bpy.types.Scene) -> tuple[float, float]:
@@ -42,47 +42,45 @@ def curves_of(datablock: bpy.types.ID) -> Iterator[bpy.types.FCurve]:
     return (curve for bag in bags_of(datablock) for curve in bag.fcurves)
 
 
-@contextmanager
-def moment(frame: float) -> Iterator[None]:
-    """Let `attributes.world_matrix` tell where objects are at another frame, while the context lasts."""
-    attributes.elsewhere = partial(_displaced, frame)
+def at_moments(
+    depsgraph: bpy.types.Depsgraph, movers: list[bpy.types.Object], frames: Iterable[float], look: Callable[[], _Seen]
+) -> list[_Seen]:
+    """What a function finds at each of some frames, where `attributes.world_matrix` tells where movers are then."""
+    now, *others = in_main_thread(partial(_placed, depsgraph, movers, (depsgraph.scene.frame_current_final, *frames)))
+    back, found = np.linalg.pinv(now), []
     try:
-        yield
+        for then in others:
+            attributes.elsewhere = dict(zip((obj.session_uid for obj in movers), then @ back, strict=True))
+            found.append(look())
     finally:
-        attributes.elsewhere = None
+        attributes.elsewhere = {}
+    return found
 
 
-def _displaced(frame: float, obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Floats:
-    """Matrix (4, 4) that takes an object from where it is now to where it is at a frame."""
-    if not attributes.moves(obj):
-        return np.eye(4)
-    outer = np.eye(4) if obj.parent is None else _displaced(frame, obj.parent, depsgraph)
-    now, then = (_animated_basis(obj, at) for at in (depsgraph.scene.frame_current_final, frame))
-    if now is None or abs(now.determinant()) < 1e-12:
-        return outer
-    # What parents and constraints make of the object's own transform, as it is now.
-    here = attributes.matrix_now(obj, depsgraph).astype(np.float64)
-    carried = here @ np.array(now.inverted(), np.float64)
-    return outer @ carried @ np.array(then, np.float64) @ np.linalg.pinv(here)
-
-
-def _animated_basis(obj: bpy.types.Object, frame: float) -> Matrix | None:
-    """An object's own transform at a time, from the curves of its action; None if it has none."""
-    values = {path: list(getattr(obj, path)) for path in _CHANNELS}
-    curves = 0
-    for curve in curves_of(obj):
-        if not curve.mute and curve.array_index < _CHANNELS.get(curve.data_path, 0):
-            values[curve.data_path][curve.array_index] = curve.evaluate(frame)
-            curves += 1
-    if not curves:
-        return None
-    return Matrix.LocRotScale(values["location"], _rotation(obj, values), values["scale"])
-
-
-def _rotation(obj: bpy.types.Object, values: dict[str, list[float]]) -> Quaternion:
-    if obj.rotation_mode == 'QUATERNION':
-        return Quaternion(values["rotation_quaternion"]).normalized()
-    if obj.rotation_mode == 'AXIS_ANGLE':
-        angle, *axis = values["rotation_axis_angle"]
-        return Quaternion(axis, angle)
-    return Euler(values["rotation_euler"], obj.rotation_mode).to_quaternion()
+def _placed(depsgraph: bpy.types.Depsgraph, movers: list[bpy.types.Object], frames: Iterable[float]) -> list[Floats]:
+    """Matrices (n, 4, 4) of objects at each of some frames; unit where one is not a number."""
+    scene = bpy.data.scenes.new("moments")
+    # Of what children hang on Blender evaluates where it is, hidden or not, and not its geometry.
+    children = [bpy.data.objects.new("moments", None) for _ in movers]
+    # What watches the scene shall not look again: nothing has changed.
+    every = bpy.app.handlers
+    handlers = every.depsgraph_update_pre, every.depsgraph_update_post, every.frame_change_pre, every.frame_change_post
+    kept, found = [list(some) for some in handlers], []
+    try:
+        for some in handlers:
+            some.clear()
+        for child, obj in zip(children, movers, strict=True):
+            scene.collection.objects.link(child)
+            child.parent = obj
+        for frame in frames:
+            # Not by an update of the view layer: that would leave animated values of this frame in the file.
+            scene.frame_set(math.floor(frame), subframe=frame % 1.0)
+            graph = scene.view_layers[0].depsgraph
+            placed = np.array([obj.evaluated_get(graph).matrix_world for obj in movers], np.float64).reshape(-1, 4, 4)
+            found.append(np.where(np.isfinite(placed).all(axis=(1, 2), keepdims=True), placed, np.eye(4)))
+    finally:
+        bpy.data.batch_remove([*children, scene])
+        depsgraph.update()
+        for some, functions in zip(handlers, kept, strict=True):
+            some.extend(functions)
+    return found

@@ -29,7 +29,7 @@ from ..species.edits import catalog, edited_infos, species_for
 from .ages import Part, classed
 from .fields import read_aged_field, read_field_matrices, stored_ages
 from .looks import LayerLooks
-from .motion import exposure, moment
+from .motion import at_moments, exposure
 from .objects import Copies, copies_of, is_drop, may_instance, may_take_part, name_keys, renderable_objects
 from .skeletons import kind_of, kind_of_choice
 
@@ -83,16 +83,13 @@ def read_plants(
         the message names the objects.
     """
     read = partial(_read_plants, scene, depsgraph)
-    if not (scene.render.use_motion_blur and any(map(moves, filter(may_take_part, bpy.data.objects)))):
+    movers = scene.render.use_motion_blur and [o for o in bpy.data.objects if may_take_part(o) and moves(o)]
+    if not movers:
         return read()
     first, last = exposure(scene)
     seconds = (last - first) * scene.render.fps_base / scene.render.fps
-    with moment(first):
-        before, *_ = read()
-    with moment(last):
-        after, *_ = read()
-    with moment((first + last) / 2.0):
-        seeds, owners, unknown = read()
+    found = at_moments(depsgraph, movers, (first, last, (first + last) / 2.0), read)
+    (before, *_), (after, *_), (seeds, owners, unknown) = found
     turned = after.frame @ before.frame.transpose(0, 2, 1)
     motion = np.concatenate([after.position - before.position, rotation_vectors(turned)], axis=1) / max(seconds, 1e-9)
     return replace(seeds, motion=motion) if motion.any() else seeds, owners, unknown
@@ -122,16 +119,25 @@ class _Found:
     own: list[bpy.types.Object]  # plants and fields of the view layer
     copies: list[Copies]
 
-    def nothing(self, scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> SceneError:
+    def nothing(self, scene: bpy.types.Scene) -> SceneError:
         """The error where no plant is left."""
         if self.odd:
             return SceneError(_unknown(self.odd))
-        found, own = self.own or self.copies, self.own
-        off = found and not any(o.tetflora.enabled for o in (*own, *(c.owner for c in self.copies)))
-        hidden = sum(o.tetflora.is_plant or o.tetflora.is_field for o in scene.objects) - len(own)
-        unknown = [o for o in renderable_objects(depsgraph.view_layer) if not o.evaluated_get(depsgraph).is_evaluated]
-        unknown = [o.name for o in unknown if may_instance(o) and o.instance_type != 'COLLECTION']
-        return NoPlantsError(_none_left(bool(off), unknown, [o.name for o in own if o.tetflora.is_field], hidden))
+        if (self.own or self.copies) and not any(
+            o.tetflora.enabled for o in (*self.own, *(c.owner for c in self.copies))
+        ):
+            return NoPlantsError("All plants in the scene are disabled; enable some in the TetFlora tab of the sidebar")
+        if fields := [o.name for o in self.own if o.tetflora.is_field]:
+            return NoPlantsError(
+                f"{listed(fields)}: the field of plants has no points; add vertices, or populate a mesh"
+            )
+        if hidden := sum(o.tetflora.is_plant or o.tetflora.is_field for o in scene.objects) - len(self.own):
+            return NoPlantsError(
+                f"No plants to render; {hidden:,} are hidden in renders or excluded from the view layer. Enable them "
+                "or their collections in the Outliner"
+            )
+        to_add = "add some with Add > TetFlora Plant, or with + under Layers in the TetFlora tab"
+        return NoPlantsError(f"No plants to render; {to_add}")
 
 
 def read_sources(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> list[Source]:
@@ -144,7 +150,7 @@ def read_sources(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> list
     """
     found = _find_plants(scene, depsgraph)
     if found.odd or not found.sources:
-        raise found.nothing(scene, depsgraph)
+        raise found.nothing(scene)
     return found.sources
 
 
@@ -155,7 +161,7 @@ def _read_plants(
     unknown = {species for _, species in found.odd}
     read = [some for source in found.sources if len((some := source.without(unknown)).part[1])]
     if not read:
-        raise found.nothing(scene, depsgraph)
+        raise found.nothing(scene)
     owners = [(source.part[0], len(source.part[1])) for source in read]
     owners[: len(found.single)] = [(obj.name, 1) for some in found.single.values() for obj in some]
     aged = classed(scene, [source.part for source in read])
@@ -278,21 +284,6 @@ def read_asset_plants(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) ->
                 f"{listed(list(dict.fromkeys(names)))}: an invalid position; clear it with Alt S and Alt G"
             )
     return found
-
-
-def _none_left(off: bool, unknown: list[str], fields: list[str], hidden: int) -> str:
-    if off:
-        return "All plants in the scene are disabled; enable some in the TetFlora tab of the sidebar"
-    if unknown:
-        return f"{listed(unknown)}: disabled in viewports, so its instances are unknown; close eyes in the Outliner"
-    if fields:
-        return f"{listed(fields)}: the field of plants has no points; add vertices, or populate a mesh"
-    if hidden:
-        return (
-            f"No plants to render; {hidden:,} are hidden in renders or excluded from the view layer. Enable them "
-            "or their collections in the Outliner"
-        )
-    return "No plants to render; add some with Add > TetFlora Plant, or with + under Layers in the TetFlora tab"
 
 
 def single_plants(plants: list[bpy.types.Object], depsgraph: bpy.types.Depsgraph) -> Seeds:
