@@ -20,7 +20,6 @@ from tetflora_addon.emission.polygons import PolygonBlock, kept_polygons, mended
 from tetflora_addon.emission.shells import proxy_shells
 from tetflora_addon.growth.seeds import Branches
 from tetflora_addon.proxies.microsurfaces import Facets
-from tetflora_addon.proxies.summaries import summarize
 from tetflora_addon.refinement.contents import Contents, InCells, cut, in_the_root, sort_into_children
 from tetflora_addon.refinement.contents import sums as sums_by_node
 from tetflora_addon.refinement.decisions import Decision
@@ -28,6 +27,7 @@ from tetflora_addon.refinement.loop import Refinement, refine
 from tetflora_addon.refinement.polygons import Meshes, Polygons, Surface, area_fractions
 from tetflora_addon.refinement.settings import RefinementSettings
 from tetflora_addon.refinement.shared_parts import AssetParts
+from tetflora_addon.refinement.summaries import summarize
 from tetflora_addon.refinement.visibility import widened_for
 from tetflora_addon.tetrahedra.roots import view_root
 from tetflora_addon.tetrahedra.tree import TetrahedralTree
