@@ -288,7 +288,7 @@ def refined(
     ones = np.ones((1, len(flora.rows), len(COUNTS)))
     there = np.unique(flora.species_of(result.plants.parts.branches.row)).tolist()
     weights = facet_weights(flora, there) if weighted else FacetWeights(ones, ones)
-    given = drawing(flora, result, camera, Transition(flora, camera, limit, np.inf), facet, weights, **options)
+    given = drawing(flora, result, Transition(flora, camera, limit, np.inf), weights, facet=facet, **options)
     return EmissionInput(flora, result, camera, given)
 
 

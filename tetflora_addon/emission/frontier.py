@@ -31,10 +31,8 @@ DETAIL, FEW = 3.0, 3.0
 SLAB, LEAST = 0.8, 100_000.0
 #: So many times as many before anything is known of what parts hide of each other.
 FIRST = 2.0
-
 #: One-sided layers of leaves that are enough where nothing is seen, and how much of its box a crown fills.
 LAYERS, FILLED = 6.0, 0.6
-
 #: How many primitives that are hidden when they are about to be made become one.
 SOONER = (4.0, 16.0)
 _THIN = 233  # draw of this module
@@ -168,8 +166,8 @@ class FrontierKind:
         return parts
 
     def ordered(self, parts: Arrays) -> Arrays:
-        """Parts in an order of their own, so that that of things in the scene does not matter."""
-        return parts
+        """Parts by their places, so that the order of things in the scene does not matter."""
+        return parts.take(np.lexsort(self.spheres(parts)[0].T))
 
 
 def opaque_fractions(silhouette: Floats, optical: Floats) -> Floats:
@@ -275,7 +273,10 @@ class Frontier:
             seen = ~outside & ~hidden
             slab, depth = slab.take(seen), depth[seen]
             slab = replace(slab, parts=kind.met(slab.parts, self.shown))
-            large = self.large(kind, slab)
+            # More of these shows than their samples tell.
+            pixels = 2.0 * slab.radius / self.coverage.camera.extent_around(slab.center)
+            large = ((pixels > DETAIL) & (slab.count > FEW)) | kind.to_be_opened(slab.parts)
+            large &= kind.can_open(slab.parts)
             ready.append(slab.take(~large))
             some = np.flatnonzero(large)
             parts, owner = kind.opened(slab.parts.take(some))
@@ -284,9 +285,3 @@ class Frontier:
             later.append(new.take(new.near > depth))
             slab, depth = new.take(soon), depth[soon]
         return Waiting.concatenate(ready), later
-
-    def large(self, kind: FrontierKind, pool: Waiting) -> Mask:
-        """Parts (n,) that are to be opened: more of them shows than their samples tell."""
-        pixels = 2.0 * pool.radius / self.coverage.camera.extent_around(pool.center)
-        shows = (pixels > DETAIL) & (pool.count > FEW)
-        return kind.can_open(pool.parts) & (shows | kind.to_be_opened(pool.parts))
