@@ -460,8 +460,6 @@ def _groups(place: Floats, group: Integers, number: int) -> tuple[Integers, Floa
 
 #: Plants that are grown one and all, the nearest ones, and how many of the others tell about them.
 _ALL, _SOME = 32, 16
-#: Leaves count as so much shorter than they are, each by its own number, see `leaf_meshes`.
-_LENGTHS = (0.75, 0.85, 0.95)
 
 
 def coarse_faces(flora: Flora, seeds: Seeds) -> Floats:
@@ -512,7 +510,7 @@ def _finer_leaves(flora: Flora, whole: WholeBranches, detail: LeafDetail) -> Flo
     for s in np.unique(species):
         own = near[species == s]
         forms = flora.forms[s][0]
-        each = [chosen_polygons(f, part * lengths[own]) for f in forms for part in _LENGTHS]
+        each = [chosen_polygons(f, _SHARE * lengths[own]) for f in forms]
         plain = np.mean([(f.polygons, f.triangles) for f in forms], axis=0)
         found += (np.mean(each, axis=0) - plain[:, None]) @ leaves[own]
     return found

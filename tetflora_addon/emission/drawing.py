@@ -45,20 +45,18 @@ _WIDER = 0.25
 #: How many primitives nobody sees become one, as many as lie behind full pixels together.
 MERGED = (4.0, 16.0, 64.0)
 #: Side of facets of hidden parts where the light reaches them, in sides of those that are seen; the optical depth in
-#: the shade over which it grows by e; and the largest.
+#: the shade over which it grows by e, and up to which things are lit; and the largest.
 HIDDEN, SHADED, LARGEST = 4.0, 1.5, 32.0
 #: Leaves that a facet which nobody sees stands for at least.
 HIDDEN_LEAVES = 8
-#: Optical depth in the shade from which on hidden facets shrink instead of being divided.
-DARK = 1.0
 #: Facets of hidden parts, and of those outside, for each pixel of the image, at most.
 HIDDEN_A_PIXEL, OUTSIDE_A_PIXEL = 0.3, 0.2
 #: So many of each are never too many.
 NEVER_TOO_MANY = 50_000.0
-#: Pixels down to which shadows that fall into the view are refined where nobody asks for finer ones, the optical depth
-#: in the shade up to which they are, leaves that a facet stands for there at least, and how many times as many there
-#: may be as of all else out of view. Without, crowns beside the image shade its borders too much.
-SHADOW, LIT, LIT_LEAVES, LIT_TIMES = 4.0, 1.5, 3.0, 9.0
+#: Pixels down to which shadows that fall into the view are refined where nobody asks for finer ones, leaves that a
+#: facet stands for there at least, and how many times as many there may be as of all else out of view. Without, crowns
+#: beside the image shade its borders too much.
+SHADOW, LIT_LEAVES, LIT_TIMES = 4.0, 3.0, 9.0
 #: Meters from which on shadows are the coarser the farther they fall: most of what they reach lies in other shade.
 FALLEN = 8.0
 #: Largest side of facets outside over their distance from the view; meters that count least, and from which on it grows
@@ -454,7 +452,7 @@ class _Tile(Canvas):
 
         Where light reaches them they are divided; in the shade each shrinks: what lies before it keeps the light out.
         """
-        dark = self.given.shade.depth(facets.center) > DARK
+        dark = self.given.shade.depth(facets.center) > SHADED
         while len(facets):
             hidden = self._hidden(facets)
             self._keep(facets.take(np.flatnonzero(hidden)), False, whose)
@@ -493,7 +491,7 @@ class _Tile(Canvas):
         pool = frontier.pool(kind, pool.parts)
         while len(pool):
             away = given.camera.distance_to_view(pool.center)
-            lit = given.shade.depth(pool.center, pool.radius) < LIT
+            lit = given.shade.depth(pool.center, pool.radius) < SHADED
             lit &= np.isfinite(given.shadows.distance(pool.center, away, pool.radius))
             left.append(pool.take(np.flatnonzero(~lit)))
             pool = pool.take(np.flatnonzero(lit))
