@@ -11,16 +11,20 @@ from __future__ import annotations
 import argparse
 import json
 import time
+from collections.abc import Iterator
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from typing import Any
 
 import numpy as np
 
-from tetflora_addon.compiled.flora import Flora
+from tetflora_addon.compiled.flora import Flora, compile_species
+from tetflora_addon.compiled.recorded_sizes import crowds, of_dense_stand
 from tetflora_addon.jobs import run_to_end
 from tetflora_addon.proxies import facet_weights
-from tetflora_addon.proxies.facet_weights import variants
+from tetflora_addon.proxies.facet_weights import SHARES, ages_measured, compiled_at_age, with_leaves
+from tetflora_addon.species.ages import ages_of
 from tetflora_addon.species.catalog import list_species, load_species
+from tetflora_addon.species.species import Species
 
 #: Blocked rays from which weights of variants follow; those of species as described follow from all.
 _RAYS = 40_000.0
@@ -50,6 +54,23 @@ def main(anew: bool) -> None:
                 _write({**before, **table})
                 last = time.monotonic()
     _write(table)
+
+
+def variants(species: Species) -> Iterator[tuple[str, Flora]]:
+    """All variants of a species of which weights are needed on any day and at any age, each with a name."""
+    plain = compile_species([species])
+    shares = SHARES if species.year is not None else SHARES[:2]
+    for share in shares:
+        yield f"{species.identifier} {share:g}", with_leaves(plain.species[0], share)
+    every = [(species, "", ages_measured(species))]
+    if len(every[0][2]) > 1 and crowds(species):
+        dense, dies = of_dense_stand(species), ages_of(species).lifespan
+        yield from ((f"{species.identifier} dense {s:g}", with_leaves(dense, s)) for s in shares)
+        every.append((dense, " dense", [age for age in ages_measured(dense) if age < dies]))
+    for one, kind, ages in every:
+        for years in ages:
+            if years != 0.0:
+                yield f"{species.identifier}{kind} {years:g} years", compiled_at_age(one, years)
 
 
 def _written() -> dict[str, Any]:

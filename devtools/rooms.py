@@ -26,7 +26,7 @@ PRODUCT = (ADDON, "operators", "panels")
 
 #: Limits of the product: source files, their lines together, lines of one room, levels of imports in ``blender``.
 MAX_FILES = 330
-MAX_LINES = 67_434
+MAX_LINES = 67_229
 MAX_ROOM_LINES = 4_000
 MAX_LEVELS = 10
 
@@ -54,7 +54,8 @@ _TABLE = {
     "geodata": ".",
     "proxies": ". species growth assets compiled subplants camera refinement",
     "light": ". compiled tetrahedra camera refinement proxies",
-    "emission": ". processes leaves species growth compiled subplants tetrahedra camera refinement proxies light",
+    "emission": ". processes leaves species growth assets compiled subplants tetrahedra camera refinement proxies "
+    "light",
     "export": ". species growth compiled subplants",
     "blender": ". processes growth camera refinement",
     "blender/materials": ". growth light blender",

@@ -18,7 +18,7 @@ from tetflora_addon.compiled.sizes import crown_of
 from tetflora_addon.growth import growth
 from tetflora_addon.jobs import run_to_end
 from tetflora_addon.proxies import microsurfaces
-from tetflora_addon.proxies.primitives import facet_mesh
+from tetflora_addon.proxies.primitives import shape_buffers, triangles_of
 from tetflora_addon.species import catalog
 from tetflora_addon.subplants import leaf_meshes, tubes
 
@@ -72,7 +72,7 @@ def opened_cell(identifier: str, orders: int) -> Callable[[], tuple[np.ndarray, 
         points = []
         if len(closed):
             facets = microsurfaces.subplant_facets(flora, closed, microsurfaces.FacetRules(np.full(len(closed), FACET)))
-            parts.append(("proxy", 0, facet_mesh(facets)))
+            parts.append(("proxy", 0, shape_buffers(triangles_of(facets))))
         for number, (kind, form, buffers) in enumerate(p for p in parts if p[2] is not None):
             proxy = materials.proxy_material
             own = [proxy()] if kind == "proxy" else leaf_objects.materials_of(scene, flora.species[0], kind, form)

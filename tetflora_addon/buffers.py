@@ -93,6 +93,20 @@ def concatenate_buffers(parts: Sequence[MeshBuffers]) -> MeshBuffers | None:
     )
 
 
+def separate_polygons(corners: Floats32, attributes: Mapping[str, tuple[str, NDArray]]) -> MeshBuffers:
+    """Polygons with corners (n, k, 3), meters, of which none shares a vertex with another, as a mesh."""
+    number, size = corners.shape[:2]
+    every = np.arange(size * number, dtype=np.int32).reshape(number, size)
+    return MeshBuffers(
+        positions=corners.reshape(-1, 3),
+        edge_verts=np.stack([every, np.roll(every, -1, axis=1)], axis=2).reshape(-1, 2),
+        corner_verts=every.ravel(),
+        corner_edges=every.ravel().copy(),
+        face_offsets=np.arange(number + 1, dtype=np.int32) * np.int32(size),
+        attributes=attributes,
+    )
+
+
 def kept_faces(mesh: MeshBuffers, kept: Mask) -> MeshBuffers:
     """Some faces of a mesh, a mask (f,), with the vertices and edges that they need."""
     size = np.diff(mesh.face_offsets)

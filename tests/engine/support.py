@@ -25,7 +25,7 @@ from tetflora_addon.growth.growth import WholeBranches, leaf_counts, trunks
 from tetflora_addon.growth.seeds import Branches, Seeds
 from tetflora_addon.proxies.facet_weights import COUNTS, FacetWeights, facet_weights
 from tetflora_addon.proxies.microsurfaces import Facets
-from tetflora_addon.proxies.primitives import joined
+from tetflora_addon.proxies.primitives import joined, shape_buffers, triangles_of
 from tetflora_addon.refinement.contents import bounding_capsules
 from tetflora_addon.refinement.loop import Refinement
 from tetflora_addon.species.catalog import builtin_folder, load_species, species_from_dict
@@ -288,7 +288,7 @@ def refined(
     ones = np.ones((1, len(flora.rows), len(COUNTS)))
     there = np.unique(flora.species_of(result.plants.parts.branches.row)).tolist()
     weights = facet_weights(flora, there) if weighted else FacetWeights(ones, ones)
-    given = drawing(flora, result, camera, Transition(flora, camera, limit, np.inf), facet, weights, **options)
+    given = drawing(flora, result, Transition(flora, camera, limit, np.inf), weights, facet=facet, **options)
     return EmissionInput(flora, result, camera, given)
 
 
@@ -301,6 +301,11 @@ def drawn(
     parts = [part for parts in scene.facet_parts() for part in parts]
     facets = joined([some for some, _ in parts]) if parts else Facets.empty()
     return blocks, facets, np.concatenate([np.zeros(0, bool), *(np.full(len(some), seen) for some, seen in parts)])
+
+
+def facet_mesh(facets: Facets) -> MeshBuffers:
+    """Facets as a mesh of triangles."""
+    return shape_buffers(triangles_of(facets))
 
 
 def bounding_cylinders(flora: Flora, subplants: Branches) -> tuple[NDArray, NDArray, NDArray]:

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays import Arrays, Floats, Floats32, Integers, Integers32, Mask, chunks, column, spread, unit
-from ..buffers import MeshBuffers
+from ..buffers import MeshBuffers, separate_polygons
 from ..growth.hashing import child_key, key_of_seed, uniform
 from .asset import AssetKites, AssetSource, SurfaceSamples
 from .patches import Hierarchy, Patches
@@ -86,22 +86,11 @@ def kites_of(
 
 def kite_mesh(leaves: AssetKites) -> MeshBuffers:
     """Kites (l,) as a mesh with the attributes that the material of proxies reads."""
-    count = len(leaves)
-    points = [leaves.center - leaves.along, leaves.center - leaves.across]
-    points += [leaves.center + leaves.along, leaves.center + leaves.across]
-    every = np.arange(4 * count, dtype=np.int32).reshape(count, 4)
-    return MeshBuffers(
-        positions=np.stack(points, axis=1).reshape(-1, 3),
-        edge_verts=np.stack([every, np.roll(every, -1, axis=1)], axis=2).reshape(-1, 2),
-        corner_verts=every.ravel(),
-        corner_edges=every.ravel().copy(),
-        face_offsets=np.arange(count + 1, dtype=np.int32) * np.int32(4),
-        attributes={
-            "tf_color": ("FACE", leaves.color.astype(np.float32)),
-            "tf_transmission": ("FACE", leaves.transmission.astype(np.float32)),
-            "tf_roughness": ("FACE", leaves.roughness.astype(np.float32)),
-        },
-    )
+    corners = [leaves.center - leaves.along, leaves.center - leaves.across]
+    corners += [leaves.center + leaves.along, leaves.center + leaves.across]
+    looks = {f"tf_{name}": getattr(leaves, name) for name in ("color", "transmission", "roughness")}
+    attributes = {name: ("FACE", values.astype(np.float32)) for name, values in looks.items()}
+    return separate_polygons(np.stack(corners, axis=1), attributes)
 
 
 #: Triangles of which all is looked at at a time.

@@ -53,7 +53,7 @@ from .averages import (
 )
 from .bounds import leaf_reaches, limb_reaches, sampled_bounds, unit_bounds, widest_radii
 from .clumping import Clumping, fit_clumping
-from .orientation import Orientation, orientation_of
+from .orientation import Orientation, face_planes, orientation_of
 from .samples import LIMB, STEM, STEM_LIMB, Limbs, Points, Samples, Shares, draw_samples
 
 
@@ -166,6 +166,11 @@ class Flora:
         wood = _wood_totals(totals) * (totals.length * totals.radius)[:, None]
         area = totals.leaf_area[:, 1] + wood / 2
         return fit_clumping(self.rows, self.forms, area, self.polygons, self.leaf_width, totals.length)
+
+    @cached_property
+    def face_planes(self) -> Floats:
+        """Planes (r, k, 3, 3) of the faces of the leaves that branches bear, see `orientation.face_planes`."""
+        return face_planes(self.rows, self.forms)
 
     @cached_property
     def raised_bound(self) -> Floats:

@@ -324,3 +324,35 @@ def _model_moments(rows: Table, forms: Sequence[Sequence[Sequence[LeafModel]]]) 
             areas = np.array([m.area for m in models])
             table[s, k] = np.einsum("f,fij->ij", areas / areas.sum(), np.array([m.moment for m in models]))
     return table[rows["species"], rows["leaf_kind"]]
+
+
+#: Planes of each kind of leaf: quantiles of the areas of its faces.
+_PLANES = 32
+
+
+def face_planes(rows: Table, forms: Sequence[Sequence[Sequence[LeafModel]]]) -> Floats:
+    """Rotations (r, `_PLANES`, 3, 3) from axes of a face to those of the leaf that each row's own branch bears.
+
+    The third axis is the normal of the face, the second as near as may be to the leaf's midrib. Each stands for the
+    same area.
+    """
+    own = np.stack([rows["species"], rows["leaf_kind"]], axis=1)
+    kinds, kind = np.unique(own, axis=0, return_inverse=True)
+    return np.array([_planes_of(forms[s][k]) for s, k in kinds.tolist()])[kind.ravel()]
+
+
+def _planes_of(models: Sequence[LeafModel]) -> Floats:
+    """Rotations (`_PLANES`, 3, 3) of one kind of leaves."""
+    vectors = np.concatenate([np.zeros((0, 3)), *(model.face_vectors for model in models)])
+    areas = np.linalg.norm(vectors, axis=1)
+    if areas.sum() <= 0.0:
+        return np.tile(np.eye(3), (_PLANES, 1, 1))
+    # Faces that are turned alike lie side by side, so that quantiles tell them apart.
+    normals = vectors / np.maximum(areas, 1e-300)[:, None]
+    order = np.lexsort(np.round(normals, 6).T)
+    share = np.cumsum(areas[order]) / areas.sum()
+    normal = normals[order[np.searchsorted(share, (np.arange(_PLANES) + 0.5) / _PLANES)]]
+    along = np.array([0.0, 1.0, 0.0]) - normal[:, 1:2] * normal
+    length = np.linalg.norm(along, axis=1, keepdims=True)
+    along = np.where(length > 1e-6, along / np.maximum(length, 1e-6), perpendicular(normal))
+    return np.stack([np.cross(along, normal), along, normal], axis=2)

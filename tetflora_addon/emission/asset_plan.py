@@ -1,10 +1,6 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Instances of assets: what they cost a renderer, and as what the frontier draws them.
-
-Cycles keeps an asset once, and a few bytes for each instance: rays find their way through ten thousand instances nearly
-as fast as through ten. Where all assets fit into memory, plain instances are the cheapest. EEVEE and the viewport draw
-every triangle of every instance. ``python -m benchmarks assets`` measures both.
+"""Instances of assets: as what the frontier draws them.
 
 What is refined becomes originals, meshes of clusters, kites, or facets. Decisions are made for clusters of up to
 `asset.MESH_FACES` faces. One is real with the probability that its leaves are, by a hash of its own, so that nothing
@@ -15,13 +11,13 @@ facets, as many as are needed for that.
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
-from functools import cached_property
 from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays import Floats, Integers, Mask, chunks, column
+from ..assets.costs import FARTHER, OriginalPolicy
 from ..camera.camera import Camera
 from ..growth.hashing import Draw, uniform
 from ..proxies.microsurfaces import Facets, facet_totals, facets_of_assets
@@ -34,8 +30,6 @@ from .plants import KITES, inside_explicit
 
 #: Stands for a species where facets are of assets.
 ASSETS = -1
-#: How many times as far plain instances are kept where the renderer shows a mesh in many places for the cost of one.
-FARTHER = 20.0
 #: Faces of a leaf up to which there is no kite for it.
 SIMPLE = 3.0
 #: Pixels of facets that only tell what is covered.
@@ -45,26 +39,12 @@ _KITES_BATCH = 200_000
 
 
 @dataclass(frozen=True)
-class OriginalPolicy:
-    """When an instance is drawn as the original."""
-
-    always: Mask  # (a,): assets of which every instance is
-    fraction: float = 0.6  # fraction of its faces that are to be real; more than 1 for never
-    #: Meshes of clusters cost the renderer as much as one of them, in however many places. Else each place counts.
-    shared: bool = False
-    #: Leaves of few pixels are kites. Without them nothing is gained by any, and all that is seen is real, but for
-    #: specks: `FARTHER` times as far as else.
-    kites: bool = True
-
-
-@dataclass(frozen=True)
 class AssetPlan:
     """Instances of assets that are drawn as they are."""
 
-    #: (k,): instances that are the originals.
-    originals: Integers = field(default_factory=lambda: np.zeros(0, np.int64))
+    originals: Integers  # (k,): instances that are the originals
     #: meshes and kites, of m, of k: PlacedClusters that are meshes of their own faces, and of kites for their leaves.
-    meshes: AssetParts = field(default_factory=AssetParts.empty)
+    meshes: AssetParts
     kites: AssetParts = field(default_factory=AssetParts.empty)
 
     @classmethod
@@ -91,11 +71,6 @@ class ClusterRows(AssetParts):
         """Parts (n,), of which some are shown already."""
         return cls(*vars(parts).values(), shown)
 
-    @property
-    def parts(self) -> AssetParts:
-        """The clusters themselves."""
-        return AssetParts(self.instance, self.cluster, self.center, self.totals, self.extent)
-
 
 @dataclass(frozen=True)
 class PlacedClusters(FrontierKind):
@@ -111,8 +86,7 @@ class PlacedClusters(FrontierKind):
 
     def everything(self) -> ClusterRows:
         """All instances."""
-        whole = self.placed.wholes()
-        return ClusterRows.of(whole, self.originals.always[self.placed.instances.asset])
+        return ClusterRows.of(self.placed.wholes(), self.originals.always[self.placed.instances.asset])
 
     def optical(self, rows: ClusterRows) -> Floats:
         """As of `FrontierKind`; of what is drawn as it is, for facets that only tell what is covered."""
@@ -132,7 +106,7 @@ class PlacedClusters(FrontierKind):
 
     def can_open(self, rows: ClusterRows) -> Mask:
         """As of `FrontierKind`; of what is drawn as it is, only what facets tell about."""
-        told = rows.shown & (self._mesh_of[rows.cluster] >= 0) & self._wide(rows)
+        told = rows.shown & (self.placed.assets.mesh_of[rows.cluster] >= 0) & self._wide(rows)
         return (self.placed.assets.clusters.children[rows.cluster] > 0) & ~told
 
     def opened(self, rows: ClusterRows) -> tuple[ClusterRows, Integers]:
@@ -142,15 +116,7 @@ class PlacedClusters(FrontierKind):
 
     def to_be_opened(self, rows: ClusterRows) -> Mask:
         """Those above clusters with meshes of their own, of which some may be real."""
-        return ~rows.shown & (self._mesh_of[rows.cluster] < 0) & (self.explicit(rows)[0] > 0.0)
-
-    def ordered(self, rows: ClusterRows) -> ClusterRows:
-        """As of `FrontierKind`."""
-        return rows.take(np.argsort(self.placed.keys(rows), kind="stable"))
-
-    @cached_property
-    def _mesh_of(self) -> Integers:
-        return self.placed.assets.mesh_of
+        return ~rows.shown & (self.placed.assets.mesh_of[rows.cluster] < 0) & (self.explicit(rows)[0] > 0.0)
 
     def _wide(self, rows: ClusterRows) -> Mask:
         """PlacedClusters (n,) of which leaves are wide enough for kites of theirs to be told apart."""
@@ -173,12 +139,12 @@ class PlacedClusters(FrontierKind):
         some, full = self.explicit(rows)
         number = uniform(self.placed.keys(rows), Draw.TRANSITION)
         whole = ~rows.shown & (rows.cluster == assets.root[asset]) & (full >= self.originals.fraction)
-        own = ~rows.shown & ~whole & (self._mesh_of[rows.cluster] == rows.cluster)
+        own = ~rows.shown & ~whole & (self.placed.assets.mesh_of[rows.cluster] == rows.cluster)
         mesh = own & (number < full)
         kites = own & ~mesh & (number < some) & (assets.clusters.leaves[rows.cluster] > 0)
         for what, chosen in (("original", whole), ("cluster", mesh), ("kites", kites)):
             if chosen.any():
-                shown.append((what, rows.parts.take(np.flatnonzero(chosen))))
+                shown.append((what, rows.take(np.flatnonzero(chosen))))
         return replace(rows, shown=rows.shown | whole | mesh | kites)
 
     def draw(self, canvas: Canvas, slab: Waiting, side: Floats, _shown: list[Shown]) -> None:
@@ -223,9 +189,13 @@ def explicit_plan(result: Refinement, originals: OriginalPolicy) -> AssetPlan:
     """Where shells stand for all other instances: what lies in explicit tetrahedra for the most part."""
     placed = result.assets.placed
     assets, asset, number = placed.assets, placed.instances.asset, len(placed.assets.clusters)
-    found = list(inside_explicit(result.assets, result, lambda parts, _: assets.mesh_of[parts.cluster] < 0))
-    parts = AssetParts.concatenate([AssetParts.empty(), *(some for some, _ in found)])
-    inside = np.concatenate([np.zeros(0), *(part for _, part in found)])
+    parts, inside = inside_explicit(
+        result.assets, result, lambda own, inside: (assets.mesh_of[own.cluster] < 0) & (inside < 1.0)
+    )
+    while (above := (assets.mesh_of[parts.cluster] < 0) & (inside >= 1.0)).any():  # so are all that these consist of
+        within, _ = placed.children(parts.take(above))
+        parts = AssetParts.concatenate([parts.take(~above), within])
+        inside = np.concatenate([inside[~above], np.ones(len(within))])
     mesh = assets.mesh_of[parts.cluster]
     inner = np.flatnonzero(mesh >= 0)
     pair, of = np.unique(parts.instance[inner].astype(np.int64) * number + mesh[inner], return_inverse=True)
@@ -235,61 +205,3 @@ def explicit_plan(result: Refinement, originals: OriginalPolicy) -> AssetPlan:
     faces = np.bincount(own.instance, own.totals.polygons, len(placed))
     whole = originals.always[asset] | (faces >= originals.fraction * assets.clusters.faces[assets.root[asset]])
     return AssetPlan(np.flatnonzero(whole), own.take(~whole[own.instance]))
-
-
-#: Bytes that Cycles takes for a triangle of an asset with its tree, and for an instance; what Blender takes for one.
-CYCLES_TRIANGLE, CYCLES_INSTANCE, BLENDER_INSTANCE = 290.0, 1_670.0, 160.0
-#: Fraction of the memory that is left which assets that Cycles loads may take.
-SAFE = 0.8
-#: Triangles of all instances up to which EEVEE draws them as fast as what would take their place.
-EEVEE_FEW = 2_000_000
-#: Fraction of an instance that is to be real for EEVEE to draw all of it.
-EEVEE_WHOLE = 0.6
-#: The same for Cycles, which is better off with one instance than with some hundred of clusters.
-CYCLES_WHOLE = 0.1
-#: More than any fraction.
-NEVER = 2.0
-
-
-@dataclass(frozen=True)
-class AssetCosts:
-    """What there is of each asset (a)."""
-
-    triangles: Integers  # (a,)
-    instances: Integers  # (a,)
-    #: (a,): pixels of the image that its instances would cover if nothing hid them; infinite where that is not known.
-    pixels: Floats
-
-    def plain(self, cycles: bool, left: float) -> bool:
-        """Whether all instances are best left as they are, with so many bytes left."""
-        if not cycles:
-            return bool((self.triangles * self.instances).sum() <= EEVEE_FEW)
-        return bool(self._loaded.sum() + self._of_instances.sum() <= SAFE * left)
-
-    def originals(self, cycles: bool, left: float, always: bool = True) -> OriginalPolicy:
-        """How instances are drawn that are refined: because not all can be the originals, or whatever it costs.
-
-        always: whether some assets may be the originals everywhere.
-        """
-        kept = np.zeros(len(self.triangles), bool)
-        if not cycles:
-            return OriginalPolicy(kept, EEVEE_WHOLE)
-        if not always and self.plain(cycles, left):
-            return OriginalPolicy(kept, CYCLES_WHOLE, shared=True, kites=False)
-        # Those that cover most for what they take; none but these is loaded at all.
-        cost = self._loaded + self._of_instances
-        if always:
-            order = np.argsort(-self.pixels / np.maximum(cost, 1.0), kind="stable")
-            room = SAFE / 2 * left
-            for one in order.tolist():  # of some dozens; one that does not fit keeps no other out
-                kept[one] = cost[one] <= room
-                room -= cost[one] if kept[one] else 0.0
-        return OriginalPolicy(kept, NEVER, shared=True)
-
-    @property
-    def _loaded(self) -> Floats:
-        return CYCLES_TRIANGLE * self.triangles
-
-    @property
-    def _of_instances(self) -> Floats:
-        return (CYCLES_INSTANCE + BLENDER_INSTANCE) * self.instances

@@ -3,24 +3,18 @@
 """A budget of polygons: the finest image that fits (beyond the paper, whose only limit is the cutoff); and estimates of
 what refining and expanding will take: seconds, polygons and bytes.
 
-How many polygons and facets an image has follows from the pixels that plants cover: parts are drawn until these are
-full. Where facets are larger, there are fewer, as their area is. Where there are few, they may be finer than they have
-to be: a small image is drawn as a larger one, since what hides facets has to be known as finely as they are. Shells
-have one size; there, real leaves go to the tetrahedra that gain most by them for each polygon.
+Where facets are larger, there are fewer, as their area is. Where there are few, they may be finer than they have to be:
+what hides facets has to be known as finely as they are. Shells have one size; there, real leaves go to the tetrahedra
+that gain most by them for each polygon.
 
 Estimates look at a few thousand leaves and branches, which stand for all there are (`compiled.sizes.CrownParts`), more
-of them on near plants. Each has a place in the image and a size there, from which follow its polygons, as they do when
-it is drawn. In each part of the image they lie one behind the other: as many as fill it are drawn, and of what is
-behind them or out of view few facets are made. So numbers follow from the rules of drawing and the budget, with their
-own constants; only how many layers fill a pixel is measured.
+of them on near plants. From their places and sizes in the image their polygons follow by the rules of drawing and the
+budget; in each part of the image as many are drawn as fill it. Only how many layers fill a pixel is measured, and
+seconds: fitted to the processor's of ``python -m benchmarks estimates``, so that the largest error is least, whenever
+refinement changes; those of what is expanded to plants of three species. Other machines differ by their speed.
 
-Seconds follow from the plants and branches that are opened, and from what is made. They are fitted to the processor's
-seconds of the scenes of ``python -m benchmarks estimates``, so that the largest error is least, whenever refinement
-changes; those of what is expanded to plants of three species. Other machines differ by their speed.
-
-The leaves and the wood that are near a camera are far finer: a spruce three meters away has a hundred times as many
-polygons as the same one from afar. Branches are few beside the polygons on them, so where all is expanded the nearest
-plants are grown to their twigs to ask each branch how fine it will be.
+A spruce three meters away has a hundred times as many polygons as the same one from afar. Where all is expanded the
+nearest plants are therefore grown to their twigs to ask each branch how fine it will be.
 """
 
 from collections.abc import Iterator
@@ -304,8 +298,7 @@ def estimate(
         That draw tiles beside Blender; 0 where it does so itself.
     """
     parts, plant = stand.parts(camera)
-    extent = camera.extent_around(parts.position)
-    whole = _polygons(stand.crowns, parts, stand.which[plant], camera, extent)
+    whole = _polygons(stand.crowns, parts, stand.which[plant], camera)
     plants = round(stand.number.sum())
     seconds, memory = SECONDS + SECONDS_PER_PLANT * plants, used + BYTES_PER_PLANT * plants
     memory += BYTES_PER_PROCESS * processes
@@ -313,7 +306,7 @@ def estimate(
         made = whole @ parts.number
         memory += BYTES_PER_TRIANGLE * float(made[1])
         return Estimate(plants, float(made[0]), seconds + float(SECONDS_EXPANDED @ made), memory, False)
-    wanted, opened = _numbers(stand, camera, settings, parts, plant, extent, whole[0])
+    wanted, opened = _numbers(stand, camera, settings, parts, plant, whole[0])
     made = min(wanted, settings.max_polygons or np.inf, allowed / BYTES_PER_POLYGON)
     seconds += SECONDS_MADE * made + float(SECONDS_OPENED @ opened) * made / max(wanted, 1.0)
     busy = min(max(processes, 1) / max(camera.width // TILE, 1), 1.0)
@@ -322,19 +315,13 @@ def estimate(
 
 
 def _numbers(
-    stand: Stand,
-    camera: Camera,
-    settings: RefinementSettings,
-    parts: CrownParts,
-    plant: Integers,
-    extent: Floats,
-    whole: Floats,
+    stand: Stand, camera: Camera, settings: RefinementSettings, parts: CrownParts, plant: Integers, whole: Floats
 ) -> tuple[float, Floats]:
     """Polygons and facets without limits, and what is opened (2,), see `SECONDS_OPENED`.
 
-    ``whole`` (n,) is `_polygons` of parts, ``extent`` (n,) meters of a pixel.
+    ``whole`` (n,) is `_polygons` of parts.
     """
-    pixels = camera.width * camera.height
+    pixels, extent = camera.width * camera.height, camera.extent_around(parts.position)
     inside = _inside(parts, camera, extent)
     outside = ~inside & (parts.form >= 0)
     leaves = np.where(outside, parts.number, 0.0) / _LEAVES
@@ -389,9 +376,10 @@ def _inside(parts: CrownParts, camera: Camera, extent: Floats) -> Mask:
     return between & (camera.distance_to_view(parts.position) <= reach)
 
 
-def _polygons(crowns: tuple[Crown, ...], parts: CrownParts, which: Integers, camera: Camera, extent: Floats) -> Floats:
+def _polygons(crowns: tuple[Crown, ...], parts: CrownParts, which: Integers, camera: Camera) -> Floats:
     """Polygons and triangles (2, n) of leaves and branches at the level of detail they have where they come nearest."""
     slope = 0.0 if camera.kind == "ORTHO" else camera.pixel_size
+    extent = camera.extent_around(parts.position)
     extent = np.maximum(extent - slope * parts.reach, extent / NEARER)
     out = np.ones((2, len(parts)))
     for form, own in _by_form(crowns, parts, which):
@@ -472,8 +460,6 @@ def _groups(place: Floats, group: Integers, number: int) -> tuple[Integers, Floa
 
 #: Plants that are grown one and all, the nearest ones, and how many of the others tell about them.
 _ALL, _SOME = 32, 16
-#: Leaves count as so much shorter than they are, each by its own number, see `leaf_meshes`.
-_LENGTHS = (0.75, 0.85, 0.95)
 
 
 def coarse_faces(flora: Flora, seeds: Seeds) -> Floats:
@@ -524,7 +510,7 @@ def _finer_leaves(flora: Flora, whole: WholeBranches, detail: LeafDetail) -> Flo
     for s in np.unique(species):
         own = near[species == s]
         forms = flora.forms[s][0]
-        each = [chosen_polygons(f, part * lengths[own]) for f in forms for part in _LENGTHS]
+        each = [chosen_polygons(f, _SHARE * lengths[own]) for f in forms]
         plain = np.mean([(f.polygons, f.triangles) for f in forms], axis=0)
         found += (np.mean(each, axis=0) - plain[:, None]) @ leaves[own]
     return found

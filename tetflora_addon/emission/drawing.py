@@ -27,10 +27,11 @@ from ..proxies.microsurfaces import CIRCUMRADIUS, STRETCH, Facets, pushed_outsid
 from ..proxies.primitives import Primitive, joined, triangle_corners
 from ..refinement.contents import polygon_totals
 from ..refinement.decisions import contributions
+from ..refinement.lights import ShadowReach
 from ..refinement.loop import Refinement
 from ..refinement.shared_parts import SharePoints
 from .asset_plan import PlacedClusters
-from .coverage import Coverage, Shade, ShadowReach
+from .coverage import Coverage, Shade
 from .frontier import DETAIL, FEW, Canvas, Frontier, FrontierKind, Shown, Waiting, Whose, corners_of_faces
 from .plants import Block, GrownPlants, PlantRows, Transition
 from .polygons import FaceRows, Faces
@@ -44,20 +45,18 @@ _WIDER = 0.25
 #: How many primitives nobody sees become one, as many as lie behind full pixels together.
 MERGED = (4.0, 16.0, 64.0)
 #: Side of facets of hidden parts where the light reaches them, in sides of those that are seen; the optical depth in
-#: the shade over which it grows by e; and the largest.
+#: the shade over which it grows by e, and up to which things are lit; and the largest.
 HIDDEN, SHADED, LARGEST = 4.0, 1.5, 32.0
 #: Leaves that a facet which nobody sees stands for at least.
 HIDDEN_LEAVES = 8
-#: Optical depth in the shade from which on hidden facets shrink instead of being divided.
-DARK = 1.0
 #: Facets of hidden parts, and of those outside, for each pixel of the image, at most.
 HIDDEN_A_PIXEL, OUTSIDE_A_PIXEL = 0.3, 0.2
 #: So many of each are never too many.
 NEVER_TOO_MANY = 50_000.0
-#: Pixels down to which shadows that fall into the view are refined where nobody asks for finer ones, the optical depth
-#: in the shade up to which they are, leaves that a facet stands for there at least, and how many times as many there
-#: may be as of all else out of view. Without, crowns beside the image shade its borders too much.
-SHADOW, LIT, LIT_LEAVES, LIT_TIMES = 4.0, 1.5, 3.0, 9.0
+#: Pixels down to which shadows that fall into the view are refined where nobody asks for finer ones, leaves that a
+#: facet stands for there at least, and how many times as many there may be as of all else out of view. Without, crowns
+#: beside the image shade its borders too much.
+SHADOW, LIT_LEAVES, LIT_TIMES = 4.0, 3.0, 9.0
 #: Meters from which on shadows are the coarser the farther they fall: most of what they reach lies in other shade.
 FALLEN = 8.0
 #: Largest side of facets outside over their distance from the view; meters that count least, and from which on it grows
@@ -115,12 +114,12 @@ class Drawing:
     kinds: Sequence[FrontierKind]  # of all that there is
     parts: Sequence[Arrays]  # what there is of each, to begin with
     camera: Camera
-    facet: float  # side of facets that are seen, pixels
-    hidden: float  # sides of facets over those that are asked for: the larger, the fewer stand for what is not seen
     shadows: ShadowReach
     shade: Shade
     occluders: Floats  # (t, 3, 3): triangles of opaque polygons, meters
-    covered: Floats  # (2, columns): pixels in each column that the loop found covered, as they are and by their sizes
+    covered: Floats  # (columns,): pixels in each column that the loop found covered
+    facet: float  # side of facets that are seen, pixels
+    hidden: float = 1.0  # sides of facets over those that are asked for: the larger, the fewer for what is not seen
     form: FacetConverter | None = None  # what becomes of facets where they are made; without, they stay what they are
     most: float = np.inf  # polygons and facets that there may be, should what is expected be wrong
     shadow: float = 0.0  # pixels down to which shadows of what is not seen are refined; 0 leaves them coarse
@@ -140,19 +139,14 @@ def tiles_of(camera: Camera) -> int:
 def drawing(
     flora: Flora,
     result: Refinement,
-    camera: Camera,
     transition: Transition,
-    facet: float,
     weights: FacetWeights,
-    hidden: float = 1.0,
-    occluders: Floats | None = None,
-    form: FacetConverter | None = None,
-    most: float = np.inf,
-    shadow: float = 0.0,
     assets: PlacedClusters | None = None,
+    occluders: Floats | None = None,
+    **options: Any,
 ) -> Drawing:
-    """What a refinement is drawn with, see `Drawing`."""
-    points = SharePoints.concatenate([result.plants.points, result.assets.points])
+    """What a refinement is drawn with for the camera of a transition; options are other fields of `Drawing`."""
+    camera, points = transition.camera, SharePoints.concatenate([result.plants.points, result.assets.points])
     polygons = result.polygons
     places = np.concatenate([points.position, polygons.center])
     shade = Shade(places, np.concatenate([points.optical_area, polygon_totals(polygons).optical_area]), result.lights)
@@ -169,22 +163,17 @@ def drawing(
         kinds.append(faces)
         parts.append(rows := FaceRows.of(polygons))
         occluders = np.concatenate([occluders, faces.triangles(rows, TILE / 2)])
-    covered = _covered_columns(result, camera)
-    return Drawing(kinds, parts, camera, facet, hidden, shadows, shade, occluders, covered, form, most, shadow)
+    return Drawing(kinds, parts, camera, shadows, shade, occluders, _covered_columns(result, camera), **options)
 
 
 def _covered_columns(result: Refinement, camera: Camera) -> Floats:
-    """Pixels (2, width) in each column of the image that the loop found covered, by the middles of its tetrahedra.
-
-    The second row is the same over the square meters that a pixel spans there.
-    """
+    """Pixels (width,) in each column of the image that the loop found covered, by the middles of its tetrahedra."""
     seen = np.flatnonzero(result.in_view[result.nodes])
     covered = contributions(result.cells, result.transmittance)[seen]
     middle = result.tree.vertices(result.nodes[seen]).mean(axis=1)
     coverage = Coverage(camera, (0, 1))
     column = np.clip(np.nan_to_num(coverage.project(middle)[0]), 0, coverage.width - 1).astype(np.int64)
-    near = covered / np.maximum(camera.extent_around(middle), 1e-9) ** 2
-    return np.stack([np.bincount(column, some, coverage.width) for some in (covered, near)])
+    return np.bincount(column, covered, coverage.width)
 
 
 def drawn_blocks(given: Drawing) -> Iterator[int | Block | Parts | Shown]:
@@ -248,13 +237,13 @@ def _tiles(given: Drawing) -> tuple[list[_Item], list[Arrays], list[Shown]]:
             some = kind.opened(kind.met(some.take(np.flatnonzero(wide)), frontier.shown))[0]
         inside.append([kind.ordered(type(some).concatenate(found.pop(0))) for _ in range(number)])
         outside.append(kind.ordered(type(some).concatenate(beyond)))
-    (covered, near), tiles, away = given.covered, [], {}
-    covered = covered + _LEAST_SHARE * max(covered.mean(), 1.0)
+    covered, tiles, away = given.covered + _LEAST_SHARE * max(given.covered.mean(), 1.0), [], {}
     for tile, (first, end) in enumerate(itertools.pairwise(ends.tolist())):
         own = [of[tile] for of in inside]
         if any(map(len, own)):
             tiles.append((tile, (first, end), own, float(covered[first:end].sum() / covered.sum())))
-            away[tile] = covered[first:end].sum() / max(near[first:end].sum(), 1e-9)
+            pools = map(frontier.pool, frontier.kinds, own)
+            away[tile] = min(pool.near.min(initial=np.inf) for pool in pools)
     return sorted(tiles, key=lambda item: away[item[0]]) if given.tiles else tiles, outside, frontier.shown
 
 
@@ -352,31 +341,26 @@ class _Tile(Canvas):
         """
         if number <= 0.0:
             return
-        extent_around = self.given.camera.extent_around
 
-        def size(mesh: MeshBuffers) -> Floats:
-            faces = _facets_of_faces(*corners_of_faces(mesh), mesh, np.arange(mesh.polygons))
-            return faces.side / extent_around(faces.center)
+        def rank(what: tuple, one: Primitive | MeshBuffers) -> Floats:
+            if not isinstance(one, MeshBuffers):
+                place = one.center if isinstance(one, Facets) else one.place.reshape(len(one), -1, 3)[:, 0]
+                return 2.0 * what[1] + uniform(place_keys(place.astype(np.float64)), _LEFT)
+            faces = _facets_of_faces(*corners_of_faces(one), one, np.arange(one.polygons))
+            pixels = faces.side / self.given.camera.extent_around(faces.center)
+            return 1.0 + pixels / (1.0 + pixels)
 
-        for seen in (False, None, True):
-            there: dict[Any, Any] = {what: joined(own) for what, own in self._facets.items() if what[1] == seen}
-            if seen is None:
-                there = {what: concatenate_buffers(own) for what, own in self.meshes.items()}
-            ranks = [size(one) if seen is None else uniform(place_keys(_places(one)), _LEFT) for one in there.values()]
-            first = np.cumsum([0, *map(len, ranks)])
-            gone = int(min(np.ceil(max(number, 0.0)), first[-1]))
-            if not gone:
-                continue
-            kept = np.ones(first[-1], bool)
-            kept[np.argsort(np.concatenate(ranks), kind="stable")[:gone]] = False
-            for (what, one), own in zip(there.items(), np.split(kept, first[1:-1]), strict=True):
-                if seen is None:
-                    self.meshes[what] = [kept_faces(one, own)]
-                elif own.any():
-                    self._facets[what] = [one.take(np.flatnonzero(own))]
-                else:
-                    del self._facets[what]
-            self.number, number = self.number - gone, number - gone
+        there: dict[Any, Any] = {what: joined(own) for what, own in self._facets.items()}
+        there |= {what: concatenate_buffers(own) for what, own in self.meshes.items()}
+        ranks = [rank(what, one) for what, one in there.items()]
+        kept = np.ones(sum(map(len, ranks)), bool)
+        kept[np.argsort(np.concatenate(ranks), kind="stable")[: int(np.ceil(number))]] = False
+        self._facets.clear()
+        for (what, one), own in zip(there.items(), np.split(kept, np.cumsum([*map(len, ranks)])[:-1]), strict=True):
+            if isinstance(one, MeshBuffers):
+                self.meshes[what] = [kept_faces(one, own)]
+            elif own.any():
+                self._facets[what] = [one.take(np.flatnonzero(own))]
 
     # -- what is seen ---------------------------------------------------------------------------------------------
 
@@ -461,14 +445,14 @@ class _Tile(Canvas):
         for pool in pools:
             pixels = np.minimum(HIDDEN * np.exp(given.shade.depth(pool.center) / SHADED), LARGEST)
             sides.append(pixels * given.facet * given.camera.extent_around(pool.center))
-        self._draw_unseen(pools, sides, most, self._add_hidden)
+        self._draw_unseen(pools, sides, most, False)
 
     def _add_hidden(self, facets: Facets, whose: Whose) -> None:
         """Facets of hidden parts, smaller until they lie behind full pixels; what would show even so is left out.
 
         Where light reaches them they are divided; in the shade each shrinks: what lies before it keeps the light out.
         """
-        dark = self.given.shade.depth(facets.center) > DARK
+        dark = self.given.shade.depth(facets.center) > SHADED
         while len(facets):
             hidden = self._hidden(facets)
             self._keep(facets.take(np.flatnonzero(hidden)), False, whose)
@@ -481,18 +465,14 @@ class _Tile(Canvas):
     def _draw_outside(self, pools: list[Waiting], share: float, most: float) -> None:
         """Parts out of view: facets as large as their distance and the shadows that they throw allow."""
         few, free = (self._few(OUTSIDE_A_PIXEL, share, of) for of in (most, np.inf))
-
-        def add(facets: Facets, whose: Whose) -> None:
-            self._keep(pushed_outside_view(facets, self.coverage.camera.distance_to_view), False, whose)
-
         fine, pools = map(list, zip(*map(self._for_shadows, self.given.kinds, pools), strict=True))
-        extents = [self._shadow * self.given.camera.extent_around(pool.center) for pool in fine]
+        extents = [(self.given.shadow or SHADOW) * self.given.camera.extent_around(pool.center) for pool in fine]
         sides = list(map(np.minimum, map(self._sides_outside, fine), extents))
         leaves = 1.0 if self.given.shadow else LIT_LEAVES
         # Of what a limit leaves, all else has half (`_few`) and these have three times that, since they are opened.
         room = max(1.5 * (most - self.number), 0.0)
-        self._draw_unseen(fine, sides, min(LIT_TIMES * free, room), add, leaves, LARGEST_OUTSIDE)
-        self._draw_unseen(pools, list(map(self._sides_outside, pools)), few, add, largest=LARGEST_OUTSIDE)
+        self._draw_unseen(fine, sides, min(LIT_TIMES * free, room), True, leaves)
+        self._draw_unseen(pools, list(map(self._sides_outside, pools)), few, True)
 
     def _sides_outside(self, pool: Waiting) -> Floats:
         """Sides (n,) of facets of parts out of view, meters."""
@@ -504,41 +484,31 @@ class _Tile(Canvas):
         fallen = np.maximum(fallen, least) * np.maximum(fallen / FALLEN, 1.0)
         return np.minimum(part * away * (1.0 + (away / far) ** 2), soft * fallen)
 
-    @property
-    def _shadow(self) -> float:
-        """Pixels down to which shadows of what is out of view are refined."""
-        return self.given.shadow or SHADOW
-
     def _for_shadows(self, kind: FrontierKind, pool: Waiting) -> tuple[Waiting, Waiting]:
         """Parts that throw shadows which are to be fine, opened as far as these show, and all others."""
         given, fine, left = self.given, [pool.take(slice(0))], [pool.take(slice(0))]
-        frontier = Frontier(given.kinds, self.coverage, self._shadow)
+        frontier = Frontier(given.kinds, self.coverage, given.shadow or SHADOW)
         pool = frontier.pool(kind, pool.parts)
         while len(pool):
             away = given.camera.distance_to_view(pool.center)
-            lit = given.shade.depth(pool.center, pool.radius) < LIT
+            lit = given.shade.depth(pool.center, pool.radius) < SHADED
             lit &= np.isfinite(given.shadows.distance(pool.center, away, pool.radius))
             left.append(pool.take(np.flatnonzero(~lit)))
             pool = pool.take(np.flatnonzero(lit))
             pixels = 2.0 * pool.radius / given.camera.extent_around(pool.center)
-            large = kind.can_open(pool.parts) & (pixels > DETAIL * self._shadow) & (pool.count > FEW)
+            large = kind.can_open(pool.parts) & (pixels > DETAIL * frontier.facet) & (pool.count > FEW)
             fine.append(pool.take(np.flatnonzero(~large)))
             pool = frontier.pool(kind, kind.opened(pool.parts.take(np.flatnonzero(large)))[0])
         return Waiting.concatenate(fine), Waiting.concatenate(left)
 
     def _draw_unseen(
-        self,
-        pools: list[Waiting],
-        sides: list[Floats],
-        most: float,
-        add: Callable[[Facets, Whose], None],
-        leaves: float = HIDDEN_LEAVES,
-        largest: float = np.inf,
+        self, pools: list[Waiting], sides: list[Floats], most: float, outside: bool, leaves: float = HIDDEN_LEAVES
     ) -> None:
         """Facets of parts that nobody sees, of sides (n,) in meters or so many leaves; about so many at most.
 
         Were there more, they are larger; where they would be larger than the largest, some parts have none.
         """
+        largest = LARGEST_OUTSIDE if outside else np.inf
         drawn = []
         for kind, pool, side in zip(self.given.kinds, pools, sides, strict=True):
             kept = kind.enough(pool.parts)
@@ -559,7 +529,11 @@ class _Tile(Canvas):
                 size = np.minimum(times * side[some], largest) / more
                 given = pool.parts.take(some), size, kept[some], self.frontier.shown
                 for whose, facets in kind.unseen(*given) if len(some) else ():
-                    add(replace(facets, side=more * facets.side), whose)
+                    facets = replace(facets, side=more * facets.side)
+                    if outside:
+                        self._keep(pushed_outside_view(facets, self.coverage.camera.distance_to_view), False, whose)
+                    else:
+                        self._add_hidden(facets, whose)
 
     def _keep(self, facets: Facets, seen: bool, whose: Whose) -> None:
         facets = facets.take(np.flatnonzero(facets.side > 0.0))
@@ -567,12 +541,6 @@ class _Tile(Canvas):
         if len(facets):
             form = self.given.form
             self._facets.setdefault((whose, seen), []).append(facets if form is None else form(facets, seen))
-
-
-def _places(drawn: Primitive) -> Floats:
-    """A place (n, 3) of each facet, or of what is drawn for it."""
-    place = drawn.center if isinstance(drawn, Facets) else drawn.place
-    return (place if place.ndim == 2 else place[:, 0]).astype(np.float64)
 
 
 def quarters(facets: Facets) -> Facets:

@@ -11,6 +11,7 @@ from typing import Self
 import numpy as np
 
 from ..arrays import Floats
+from ..assets.costs import OriginalPolicy
 from ..buffers import MeshBuffers, PointBuffers
 from ..camera.camera import Camera
 from ..compiled.flora import Flora
@@ -19,7 +20,7 @@ from ..proxies.microsurfaces import Facets
 from ..proxies.primitives import DrawnShapes, joined, shape_buffers, spheres_of, triangles_of
 from ..refinement.lights import sun_of
 from ..refinement.loop import Refinement
-from .asset_plan import AssetPlan, OriginalPolicy, explicit_plan
+from .asset_plan import AssetPlan, explicit_plan
 from .drawing import Drawing, FacetConverter, Parts, drawn_blocks
 from .frontier import Shown
 from .plants import TOLERANCE, Block, explicit_blocks
@@ -56,10 +57,7 @@ class EmissionInput:
         return own * self.drawing.facet * float(np.sqrt(area / number if number else 1.0))
 
     def mesh_blocks(self) -> Iterator[Block]:
-        """Meshes of plants. Facets are made with them, and wait until `facet_parts` is asked for them.
-
-        What of other things is drawn as it is can be asked for after that.
-        """
+        """Meshes of plants. Facets and what of other things is drawn as it is can be asked for after that."""
         return (made for made in self.tiles(None) if isinstance(made, Block))
 
     def tiles(self, proxies: Callable[[Self], Iterator[Buffers]] | None) -> Iterator[int | Block | Buffers]:
@@ -97,10 +95,7 @@ class EmissionInput:
         return AssetPlan.of(self.refinement.assets.placed, self.originals, [shown for _, shown in self._shown])
 
     def facet_parts(self, again: bool = False) -> Iterator[Parts]:
-        """Facets of all that is drawn as such, block by block, after `mesh_blocks`.
-
-        again: whether they will be asked for once more, so that they have to stay.
-        """
+        """Facets, block by block, after `mesh_blocks`; they stay if they will be asked for again."""
         waiting = list(self._waiting)
         if not again:
             self._waiting.clear()

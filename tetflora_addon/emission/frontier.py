@@ -31,10 +31,8 @@ DETAIL, FEW = 3.0, 3.0
 SLAB, LEAST = 0.8, 100_000.0
 #: So many times as many before anything is known of what parts hide of each other.
 FIRST = 2.0
-
 #: One-sided layers of leaves that are enough where nothing is seen, and how much of its box a crown fills.
 LAYERS, FILLED = 6.0, 0.6
-
 #: How many primitives that are hidden when they are about to be made become one.
 SOONER = (4.0, 16.0)
 _THIN = 233  # draw of this module
@@ -55,42 +53,6 @@ class Waiting(Arrays):
     near: Floats  # (n,): least depth of the sphere, meters
     cell: Integers  # (n,): cell of the image that its middle is in
     count: Floats  # (n,): facets that they would have, all of them
-
-
-class _Pool:
-    """Parts (n) of one kind that wait, in runs: what leaves is cleared, and what comes is joined, only now and then."""
-
-    def __init__(self, first: Waiting) -> None:
-        self._runs = [(first, np.arange(len(first)))]
-
-    def __len__(self) -> int:
-        return sum(len(rows) for _, rows in self._runs)
-
-    def column(self, name: str) -> NDArray:
-        """A column (n,) of `Waiting`."""
-        return np.concatenate([getattr(run, name)[rows] for run, rows in self._runs])
-
-    def _within(self, index: Integers) -> list[tuple[Waiting, Integers]]:
-        """Each run, and its rows among some (k,) of all."""
-        ends = np.cumsum([0, *(len(rows) for _, rows in self._runs)])
-        of = np.searchsorted(ends, index, side="right") - 1
-        return [(run, rows[index[of == k] - ends[k]]) for k, (run, rows) in enumerate(self._runs)]
-
-    def take(self, index: Integers) -> Waiting:
-        """Some (k,) of them."""
-        return Waiting.concatenate([run.take(rows) for run, rows in self._within(index)])
-
-    def keep(self, index: Integers, later: Sequence[Waiting]) -> int:
-        """Only some (k,) wait still, and others do from now on; how many there were."""
-        number, new = len(self), Waiting.concatenate(later) if later else self.take(np.arange(0))
-        self._runs = [*self._within(index), (new, np.arange(len(new)))]
-        for k in range(len(self._runs) - 1, 0, -1):
-            if 2 * len(self._runs[k][1]) >= len(self._runs[k - 1][1]):
-                joined = Waiting.concatenate([run.take(rows) for run, rows in self._runs[k - 1 : k + 1]])
-                self._runs[k - 1 : k + 1] = [(joined, np.arange(len(joined)))]
-            elif not len(self._runs[k][1]):
-                del self._runs[k]
-        return number
 
 
 class Canvas:
@@ -204,8 +166,8 @@ class FrontierKind:
         return parts
 
     def ordered(self, parts: Arrays) -> Arrays:
-        """Parts in an order of their own, so that that of things in the scene does not matter."""
-        return parts
+        """Parts by their places, so that the order of things in the scene does not matter."""
+        return parts.take(np.lexsort(self.spheres(parts)[0].T))
 
 
 def opaque_fractions(silhouette: Floats, optical: Floats) -> Floats:
@@ -252,12 +214,12 @@ class Frontier:
 
         In each cell of the image these are the nearest ones, which have no more than about so many facets in all.
         """
-        pools = [_Pool(self.pool(kind, own)) for kind, own in zip(self.kinds, parts, strict=True)]
-        cells = len(np.unique(np.concatenate([pool.column("cell") for pool in pools])))
+        pools = [self.pool(kind, own) for kind, own in zip(self.kinds, parts, strict=True)]
+        cells = len(np.unique(np.concatenate([pool.cell for pool in pools])))
         dense = min(SLAB * CELL**2, FIRST * most / max(cells, 1))
         for pool, *left in zip(pools, self.hidden, self.outside, strict=True):
             for one in left:
-                one.append(pool.take(np.arange(0)))
+                one.append(pool.take(slice(0)))
         while any(map(len, pools)):
             near, depth, order, cells = self._depths(pools, dense)
             ready, first = [], 0
@@ -266,7 +228,8 @@ class Frontier:
                 own = order[(order >= first) & (order < first + len(pool))]
                 begun = (near <= depth)[own]
                 made, later = self._decided(number, pool.take(own[begun] - first), depth[own[begun]])
-                first += pool.keep(own[~begun] - first, later)
+                pools[number] = Waiting.concatenate([pool.take(own[~begun] - first), *later])
+                first += len(pool)
                 ready.append(made)
             # Where much was hidden, or little is left, the next ones are so many more.
             wanted = min(max(SLAB * CELL**2 * cells, LEAST), max(most, 1.0))
@@ -275,13 +238,13 @@ class Frontier:
             if any(map(len, ready)):
                 yield ready
 
-    def _depths(self, pools: Sequence[_Pool], number: float) -> tuple[Floats, Floats, Integers, int]:
+    def _depths(self, pools: Sequence[Waiting], number: float) -> tuple[Floats, Floats, Integers, int]:
         """Least depths (n,) of parts, and those before which they have so many facets in each cell, about.
 
         Also their order (n,) by cell and depth, and how many cells there are.
         """
         every, nearest, count, radius = (
-            np.concatenate([pool.column(name) for pool in pools]) for name in ("cell", "near", "count", "radius")
+            np.concatenate([getattr(pool, name) for pool in pools]) for name in ("cell", "near", "count", "radius")
         )
         deepest = float(np.ptp(nearest)) + 1.0
         order = np.argsort(every * deepest + (nearest - nearest.min()), kind="stable")
@@ -310,7 +273,10 @@ class Frontier:
             seen = ~outside & ~hidden
             slab, depth = slab.take(seen), depth[seen]
             slab = replace(slab, parts=kind.met(slab.parts, self.shown))
-            large = self.large(kind, slab)
+            # More of these shows than their samples tell.
+            pixels = 2.0 * slab.radius / self.coverage.camera.extent_around(slab.center)
+            large = ((pixels > DETAIL) & (slab.count > FEW)) | kind.to_be_opened(slab.parts)
+            large &= kind.can_open(slab.parts)
             ready.append(slab.take(~large))
             some = np.flatnonzero(large)
             parts, owner = kind.opened(slab.parts.take(some))
@@ -319,9 +285,3 @@ class Frontier:
             later.append(new.take(new.near > depth))
             slab, depth = new.take(soon), depth[soon]
         return Waiting.concatenate(ready), later
-
-    def large(self, kind: FrontierKind, pool: Waiting) -> Mask:
-        """Parts (n,) that are to be opened: more of them shows than their samples tell."""
-        pixels = 2.0 * pool.radius / self.coverage.camera.extent_around(pool.center)
-        shows = (pixels > DETAIL) & (pool.count > FEW)
-        return kind.can_open(pool.parts) & (shows | kind.to_be_opened(pool.parts))

@@ -4,19 +4,16 @@
 
 A leaf whose width in pixels is below the limit is a facet, one that is wider by `decisions.BAND` is real; in between
 a fraction of them is real that grows with the width. Real leaves and facets are thinned out by hashes of their own
-keys: what has become real stays real as the camera comes closer, nothing pops, and the area is the same on average.
-Real leaves are single kites first, those with many planes a kite for each then, and have their faces from a few pixels
-of width on, one after another.
+keys: what has become real stays real as the camera comes closer, and the area is the same on average. Real leaves are
+single kites first, those with many planes a kite for each then, and have their faces from a few pixels of width on.
 
-Where these can be told from what they stand for, finer ones follow: lengths in the image say the level of
-`leaves.levels`, the coarsest whose margin is within a tolerance of the leaf's own. What counts is how long leaves of a
-branch are in the image where it comes nearest: nothing depends on the order of branches or on earlier images.
-
-Branches that the frontier opens are tubes while they are macroscopic, and else one thin triangle each, with the
-direction and the area of the branch.
+Where these can be told from what they stand for, lengths in the image say the level of `leaves.levels`: the coarsest
+whose margin is within a tolerance of the leaf's own, where leaves of a branch come nearest. Branches that the frontier
+opens are tubes while they are macroscopic, and else one thin triangle each, with their direction and area.
 """
 
 from collections.abc import Callable, Iterator, Sequence
+from copy import copy
 from dataclasses import dataclass, fields, replace
 from functools import cached_property
 from typing import Self
@@ -43,7 +40,7 @@ from ..refinement.contents import PlantParts, as_pieces, piece_totals
 from ..refinement.decisions import Decision, explicit_fraction
 from ..refinement.lights import Light
 from ..refinement.loop import Refinement
-from ..refinement.shared_parts import SharedParts, SharePoints, descend, opened
+from ..refinement.shared_parts import SharedParts, SharePoints, opened
 from ..species.species import LEAF_KINDS
 from ..subplants.leaf_meshes import leaf_meshes
 from ..subplants.pieces import Thin, expand, whole_pieces
@@ -197,31 +194,22 @@ class Block:
 
 def inside_explicit(
     shared: SharedParts, result: Refinement, opening: Callable[[Arrays, Floats], Mask]
-) -> Iterator[tuple[Arrays, Floats]]:
-    """All parts of one kind, some at a time, and the fraction (n,) of each that lies in explicit tetrahedra.
+) -> tuple[Arrays, Floats]:
+    """All parts (n) of one kind, and the fraction (n,) of each that lies in explicit tetrahedra.
 
     Those of which something does are opened where ``opening`` wants it of parts and these fractions.
     """
-    explicit, parts, points = result.chosen(Decision.EXPLICIT), shared.parts, shared.points
-    sure = np.zeros(len(parts), bool)
-    while len(parts):
+    explicit, shared = result.chosen(Decision.EXPLICIT), copy(shared)
+    shared.hold(shared.parts, SharePoints.concatenate([shared.points]))  # those of the refinement stay as they are
+    while True:
+        parts, points = shared.parts, shared.points
         area = points.optical_area.astype(np.float64)
         whole = np.maximum(np.bincount(points.part, area, len(parts)), 1e-300)
-        inside = np.where(sure, 1.0, np.bincount(points.part, area * explicit[points.cell], len(parts)) / whole)
+        inside = np.bincount(points.part, area * explicit[points.cell], len(parts)) / whole
         again = (inside > 0.0) & shared.can_open(parts) & opening(parts, inside)
-        yield parts.take(np.flatnonzero(~again)), inside[~again]
-        made, some = [], [np.zeros(0, bool)]
-        for new, owner, known in shared.opened(parts.take(np.flatnonzero(again))):
-            made.append((new, shared.points_on(new, known)))
-            some.append(inside[again][owner] >= 1.0)
-        sure = np.concatenate(some)
-        first = np.cumsum([0, *(len(new) for new, _ in made)])
-        parts = type(parts).concatenate([new for new, _ in made])
-        points = SharePoints.concatenate(
-            [replace(own, part=own.part + np.int32(start)) for (_, own), start in zip(made, first, strict=False)]
-        )
-        if len(points):
-            points = replace(points, cell=descend(result.tree, points))
+        if not again.any():
+            return parts, inside
+        shared.open(again, result.tree)
 
 
 def explicit_blocks(flora: Flora, result: Refinement, camera: Camera, tolerance: float = np.inf) -> Iterator[Block]:
@@ -229,36 +217,34 @@ def explicit_blocks(flora: Flora, result: Refinement, camera: Camera, tolerance:
 
     Parts that lie in explicit tetrahedra in part are opened; margins of near leaves may be off by a tolerance, pixels.
     """
-    plants = result.plants
-    full, bodies = [Branches.empty()], [Branches.empty()]
-    for parts, inside in inside_explicit(
-        plants, result, lambda parts, inside: (inside < 1.0) & (plants.pixels(parts) > MIXED)
-    ):
-        full.append(parts.branches.take(np.flatnonzero((inside >= 0.5) & ~parts.branch_only)))
-        bodies.append(parts.branches.take(np.flatnonzero((inside >= 0.5) & parts.branch_only)))
-    detail = LeafDetail(flora, camera, tolerance)
-    runs = []
-    for alone, some in ((False, Branches.concatenate(full)), (True, Branches.concatenate(bodies))):
+    plants, runs = result.plants, []
+    parts, inside = inside_explicit(plants, result, lambda own, inside: (inside < 1.0) & (plants.pixels(own) > MIXED))
+    for alone in (False, True):
+        some = parts.branches.take(np.flatnonzero((inside >= 0.5) & (parts.branch_only == alone)))
         # Front to back, ties by the plants themselves, so that their order in the scene does not matter.
         away = np.linalg.norm(some.position - camera.eye, axis=1)
         some = some.take(np.lexsort([some.key, away]))
         polygons = piece_totals(flora, as_pieces(some)).polygons if alone else flora.face_counts(some)
         runs += [(alone, some.take(run)) for run in chunks(polygons, BLOCK_POLYGONS)]
-    items = [(number, (number + 1) / len(runs), *run) for number, run in enumerate(runs)]
-    for made in in_processes(_expanded, (flora, detail), items, len(items) > 1):
-        while made:
-            yield made.pop(0)
+    yield from _made_in_processes(flora, LeafDetail(flora, camera, tolerance), runs, len(runs) > 1)
 
 
 def expanded_blocks(flora: Flora, seeds: Seeds, camera: Camera | None = None) -> Iterator[Block]:
     """Polygons of all plants, seen or not; for comparison. A camera sees what is near as finely as everywhere."""
     plants = trunks(flora.rows, seeds)
-    detail = None if camera is None else LeafDetail(flora, camera)
     full = flora.polygons[plants.row] if plants.crown is None else flora.face_counts(plants)
-    parts = list(chunks(full, BLOCK_POLYGONS))
-    runs = ((number, (number + 1) / len(parts), False, plants.take(run)) for number, run in enumerate(parts))
-    worth = len(parts) > 1 and float(full.sum()) > WORTH_PROCESSES
-    for made in in_processes(_expanded, (flora, detail), runs, worth):
+    runs = [(False, plants.take(run)) for run in chunks(full, BLOCK_POLYGONS)]
+    worth = len(runs) > 1 and float(full.sum()) > WORTH_PROCESSES
+    yield from _made_in_processes(flora, None if camera is None else LeafDetail(flora, camera), runs, worth)
+
+
+def _made_in_processes(
+    flora: Flora, detail: LeafDetail | None, runs: list[tuple[bool, Branches]], worth: bool
+) -> Iterator[Block]:
+    """The meshes of runs of branches, which are alone or with all that grows on them."""
+    number = len(runs)
+    items = ((n, (n + 1) / number, *runs.pop(0)) for n in range(number))
+    for made in in_processes(_expanded, (flora, detail), items, worth):
         while made:
             yield made.pop(0)
 
@@ -375,10 +361,6 @@ class GrownPlants(FrontierKind):
     def to_be_opened(self, parts: PlantParts) -> Mask:
         """Those of which leaves are real."""
         return self.transition.of_branches(parts.branches) > 0.0
-
-    def ordered(self, parts: PlantParts) -> PlantParts:
-        """As of `FrontierKind`."""
-        return parts.take(np.lexsort([*parts.branches.position.T, parts.branches.key]))
 
     def draw(self, canvas: Canvas, slab: Waiting, side: Floats, _shown: list[Shown]) -> None:
         """As of `FrontierKind`."""

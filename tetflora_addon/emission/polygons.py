@@ -13,7 +13,7 @@ along the triangles of a mesh, which keeps its area with little noise.
 
 from collections.abc import Iterator
 from copy import copy
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Self
 
 import numpy as np
@@ -27,7 +27,7 @@ from ..proxies.microsurfaces import Facets
 from ..refinement.contents import polygon_totals
 from ..refinement.decisions import Decision
 from ..refinement.loop import Refinement
-from ..refinement.polygons import Meshes, Polygons, area_fractions
+from ..refinement.polygons import Meshes, Polygons, mended
 from .frontier import Canvas, FrontierKind, Shown, Waiting, Whose
 
 #: Least fraction of a surface that is opaque where it hides what is behind.
@@ -81,10 +81,6 @@ class Faces(FrontierKind):
         extent = self.camera.extent_around(rows.center)
         return np.where(self._wide(rows), np.minimum(rows.optical, extent**2), rows.optical)
 
-    def ordered(self, rows: FaceRows) -> FaceRows:
-        """As of `FrontierKind`."""
-        return rows.take(np.lexsort([rows.face, *rows.center.T]))
-
     def _wide(self, rows: FaceRows) -> Mask:
         width = self.meshes.width[rows.face] * self.meshes.mean_scale[rows.instance]
         return width >= self.limit * self.camera.extent_around(rows.center)
@@ -131,26 +127,21 @@ def _stays(rows: FaceRows, side: Floats) -> Mask:
 
 
 def chosen_facets(polygons: Polygons, optical: Floats, side: Floats) -> Facets:
-    """Facets of polygons (n,) that stand for an area ``optical`` (n,) in m², with sides (n,) in meters.
+    """Facets of whole faces (n,) that stand for an area ``optical`` (n,) in m², with sides (n,) in meters.
 
     Their number is random; its expectation is the area over that of a facet.
     """
     meshes = polygons.meshes
-    owner, triangle, fraction = polygons.triangles()
-    vector = meshes.vectors(triangle, polygons.instance[owner])
-    own = fraction * np.linalg.norm(vector, axis=1)
+    owner, triangle, _ = polygons.triangles()
+    vector, key = meshes.vectors(triangle, polygons.instance[owner]), key_of_seed(polygons.instance)[owner]
+    own = np.linalg.norm(vector, axis=1)
     of_polygon = np.bincount(owner, own, len(polygons))
     rate = optical / (np.maximum(of_polygon, 1e-300) * np.maximum(side, 1e-12) ** 2)
-    key = _keys(polygons, owner)
     pick, number = spread(np.floor(own * rate[owner] + stepped(key, triangle)).astype(np.int64))
 
-    thing = owner[pick]
-    face, instance = polygons.face[thing], polygons.instance[thing]
-    key = child_key(mix(key_of_seed(triangle[pick]) ^ key[pick]), number)  # several facets of a triangle lie apart
-    weights = np.broadcast_to(np.eye(3), (len(pick), 3, 3)).copy()
-    cut = np.flatnonzero(polygons.part[thing] >= 0)
-    weights[cut] = polygons.weights[polygons.part[thing[cut]]]
-    corners = weights @ meshes.corners(triangle[pick], instance)
+    thing, triangle = owner[pick], triangle[pick]
+    key = child_key(mix(key_of_seed(triangle) ^ key[pick]), number)  # several facets of a triangle lie apart
+    corners = meshes.corners(triangle, polygons.instance[thing])
     root, v = np.sqrt(uniform(key, _PLACE_U)), uniform(key, _PLACE_V)
     at = np.stack([1 - root, root * (1 - v), root * v], axis=1)
     center = np.einsum("nk,nki->ni", at, corners)
@@ -158,25 +149,12 @@ def chosen_facets(polygons: Polygons, optical: Floats, side: Floats) -> Facets:
     edges = np.roll(corners, -1, axis=1) - corners
     longest = np.linalg.norm(edges, axis=2).argmax(axis=1)
     along = unit(edges[np.arange(len(pick)), longest])
-    slot = meshes.slot[face]
-    material = meshes.colors[slot], meshes.transmission[slot]
-    return Facets(center, np.cross(along, normal), along, side[thing], *material)
-
-
-def _keys(polygons: Polygons, owner: Integers) -> NDArray[np.uint64]:
-    """Keys (m,) of triangles of polygons by their instance and, for fragments, by their corners."""
-    key = key_of_seed(polygons.instance)
-    cut = np.flatnonzero(polygons.part >= 0)
-    corners = polygons.weights[polygons.part[cut]].reshape(-1, 9) + 0.0  # no negative zeros, which have other bits
-    for bits in np.ascontiguousarray(corners).view(np.uint64).T:
-        key[cut] = mix(key[cut] ^ bits)
-    return key[owner]
+    slot = meshes.slot[polygons.face[thing]]
+    return Facets(center, np.cross(along, normal), along, side[thing], meshes.colors[slot], meshes.transmission[slot])
 
 
 #: Shapes of attributes by their number of components; a mesh cannot hold others.
 _FLOATS = {1: (), 2: (2,), 3: (3,)}
-#: Part of a face that may be missing through rounding errors alone.
-_WHOLE = 1e-6
 
 
 @dataclass(frozen=True)
@@ -210,25 +188,6 @@ def polygon_blocks(polygons: Polygons) -> Iterator[PolygonBlock]:
             yield PolygonBlock(int(s), number, buffers, (number + 1) / len(runs))
 
 
-def mended(polygons: Polygons) -> Polygons:
-    """The same polygons, with a face in place of its first fragment where all of its fragments are there."""
-    cut = np.flatnonzero(polygons.part >= 0)
-    if not len(cut):
-        return polygons
-    meshes = polygons.meshes
-    key = polygons.instance[cut].astype(np.int64) * len(meshes.face_size) + polygons.face[cut]
-    _, first, number = np.unique(key, return_index=True, return_inverse=True)
-    number = number.reshape(-1)
-    there = np.bincount(number, area_fractions(polygons.weights)[polygons.part[cut]])
-    complete = there >= meshes.face_size[polygons.face[cut[first]]] - 2 - _WHOLE
-    part = polygons.part.copy()
-    part[cut[complete[number]]] = -1
-    stays = np.ones(len(polygons), bool)
-    stays[cut[complete[number]]] = False
-    stays[cut[first[complete]]] = True
-    return replace(polygons, part=part).take(stays)
-
-
 def polygon_buffers(polygons: Polygons) -> MeshBuffers:
     """Polygons of one surface as a mesh in world space.
 
@@ -245,20 +204,18 @@ def polygon_buffers(polygons: Polygons) -> MeshBuffers:
     count = len(meshes.positions)
     place = np.where(own_place, count + corner, meshes.corner_verts[corner])
     places = count + len(meshes.corner_verts)
-    vertices, corner_verts = np.unique(instance.astype(np.int64) * places + place, return_inverse=True)
+    vertices, shared = np.unique(instance.astype(np.int64) * places + place, return_inverse=True)
     own, vertex = np.divmod(vertices, max(places, 1))
     loose = vertex >= count
     vertex[loose] = meshes.corner_verts[vertex[loose] - count]
     points = meshes.to_world(meshes.positions[vertex][:, None], own)[:, 0]
     offsets = np.cumsum([0, *size])
-    edges, corner_edges = _edges(corner_verts.reshape(-1), offsets, len(vertices))
 
     turn = np.where(meshes.mirrored[pieces.instance][:, None], [[0, 2, 1]], [[0, 1, 2]])
     weights = np.take_along_axis(pieces.weights[pieces.part], turn[:, :, None], axis=1)
     triangle = pieces.triangle[pieces.part]
     fragments = (weights @ meshes.corners(triangle, pieces.instance)).reshape(-1, 3)
-    every = np.arange(len(fragments))
-    after = every - every % 3 + (every + 1) % 3
+    corner_verts = np.concatenate([shared.reshape(-1), np.arange(len(fragments)) + len(points)]).astype(np.int32)
 
     surface = int(meshes.surface[polygons.instance[0]])
     shown = meshes.surfaces[surface]
@@ -279,9 +236,9 @@ def polygon_buffers(polygons: Polygons) -> MeshBuffers:
     attributes["material_index"] = ("FACE", shown.material[faces - meshes.first_face[surface]].astype(np.int32))
     return MeshBuffers(
         positions=np.concatenate([points, fragments]).astype(np.float32),
-        edge_verts=np.concatenate([edges, np.stack([every, after], axis=1) + len(points)]).astype(np.int32),
-        corner_verts=np.concatenate([corner_verts.reshape(-1), every + len(points)]).astype(np.int32),
-        corner_edges=np.concatenate([corner_edges, every + len(edges)]).astype(np.int32),
+        edge_verts=np.zeros((0, 2), np.int32),  # Blender finds them, and each corner's
+        corner_verts=corner_verts,
+        corner_edges=corner_verts,
         face_offsets=np.concatenate([offsets, offsets[-1] + 3 * (1 + np.arange(len(pieces)))]).astype(np.int32),
         attributes=attributes,
         smooth=shown.normals is not None,
@@ -296,16 +253,6 @@ def _face_corners(whole: Polygons) -> tuple[Integers, Integers32, Integers]:
     mirrored = meshes.mirrored[whole.instance][owner]
     index = np.where(mirrored, size[owner] - 1 - index, index)
     return meshes.face_start[whole.face][owner] + index, whole.instance[owner], size
-
-
-def _edges(corner_verts: NDArray, offsets: NDArray, vertices: int) -> tuple[Integers, Integers]:
-    """Edges (e, 2) of faces, each once, and that from each corner (c,) to the next."""
-    following = np.arange(len(corner_verts)) + 1
-    following[offsets[1:] - 1] = offsets[:-1]
-    after = corner_verts[following]
-    key = np.minimum(corner_verts, after) * max(vertices, 1) + np.maximum(corner_verts, after)
-    edges, number = np.unique(key, return_inverse=True)
-    return np.stack(np.divmod(edges, max(vertices, 1)), axis=1), number.reshape(-1)
 
 
 def _at_corners(values: NDArray, corner: Integers, triangle: Integers, weights: Floats) -> Floats:

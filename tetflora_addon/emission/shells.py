@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from ..arrays import Floats
 from ..buffers import MeshBuffers
 from ..compiled.flora import Flora
-from ..growth.hashing import mix, uniform
+from ..growth.hashing import place_keys, uniform
 from ..light.illumination import BakedLight
 from ..light.receivers import MediumCells
 from ..refinement.decisions import Decision
@@ -28,17 +28,6 @@ _BARYCENTRIC = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], dtype=np.f
 
 # Six times the volume over the cube of the longest edge: below this a cell is flat within the precision of doubles.
 _FLAT = 1e-13
-
-
-def _cell_noise(corners: Floats) -> Floats:
-    """Random number (n,) in [0, 1) of each cell (n, 4, 3): the same wherever the same cell comes up again."""
-    # Corners as Blender stores them, without the last bits of doubles; a sum does not depend on their order.
-    places = np.ascontiguousarray(corners, dtype=np.float32) + np.float32(0.0)  # no negative zeros
-    bits = places.view(np.uint32).astype(np.uint64)
-    key = mix(bits[..., 0])
-    for axis in (1, 2):
-        key = mix(key ^ bits[..., axis])
-    return uniform(key.sum(axis=1, dtype=np.uint64), 0)
 
 
 def shell_buffers(cells: MediumCells, rank: NDArray | None = None, light: Floats | None = None) -> MeshBuffers:
@@ -77,7 +66,8 @@ def shell_buffers(cells: MediumCells, rank: NDArray | None = None, light: Floats
         "tf_s1": cells.matrices[:, 3:],
         "tf_normal": cells.normal,
         "tf_plane": cells.plane,
-        "tf_random": _cell_noise(cells.vertices),
+        # The same wherever the same cell comes up again, with its corners in any order.
+        "tf_random": uniform(place_keys(cells.vertices.reshape(-1, 3)).reshape(-1, 4).sum(axis=1), 0),
         **dict(zip(("tf_g1", "tf_g2", "tf_g3"), gradients[:, 1:].swapaxes(0, 1), strict=True)),
     }
     if light is not None:

@@ -18,8 +18,8 @@ from ..arrays import GOLDEN_TURN, Arrays, Floats, Integers, Mask, spiral
 from ..compiled.flora import Flora
 from ..optics import recollision_albedo
 from ..parallel import blocks
-from ..proxies.summaries import extinction_matrices, summarize
 from ..refinement.loop import Refinement
+from ..refinement.summaries import extinction_matrices, summarize
 from ..tetrahedra.geometry import barycentric, barycentric_gradients, volume
 from .scattering import albedo
 

@@ -148,7 +148,7 @@ def _level(flora: Flora, state: Refinement) -> Level:
 def mean_colors(flora: Flora, contents: Contents, nodes: Integers, size: int) -> Floats:
     """Mean colors (t, 3) of what nodes (t,) hold, weighted by what shows: leaves once, closed surfaces half.
 
-    Unlike `proxies.summaries` without orientation and clumping, which a preview does not show.
+    Unlike `refinement.summaries` without orientation and clumping, which a preview does not show.
     """
     row, piece_row = contents.subplants.items.row, contents.pieces.items.branches.row
     parts = []

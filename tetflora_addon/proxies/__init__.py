@@ -1,3 +1,3 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""From summaries of tetrahedra to facets, microspheres, and shells. Numpy only."""
+"""Facets, what renderers draw for them, and how much area they need. Numpy only."""

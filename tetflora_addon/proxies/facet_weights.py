@@ -4,17 +4,13 @@
 
 Leaves sit in clusters and hide each other. A few large facets spread over the same sub-plant do so less: with the full
 area they would be up to three times as opaque. Rays are cast through grown sub-plants of each row of a species and
-through their facets, at several numbers of facets; with the right weight as many rays are blocked. Weights are for
-facets what `compiled.clumping` is for evenly filled cells.
+through their facets, at several numbers of facets; with the right weight as many are blocked. Sub-plants are tested
+together with all that grow around them, of any parent, because facets spill over: next siblings alone asked for up to
+a twentieth more area. Facets of pieces are compared in the same way with what branches themselves bear.
 
-Those of shipped species are tables, measured with all rays. Others, new or changed by an artist, are measured when
-their first facet is drawn, in steps of a fraction of a second, with fewer rays where more would say the same: within
-.02 of what all rays say (`tests/engine/proxies/test_quick_weights.py`). They follow from the species alone and are
-never refined later, so that no two frames of a film, and no two computers of a farm, have different ones.
-
-Sub-plants are tested together with all that grow around them, of any parent, because facets spill over and reach
-across the gaps between neighbors. Next siblings alone asked for up to a twentieth more area, and made aspens too
-dense. Facets of pieces are compared in the same way with what branches themselves bear.
+Those of shipped species are tables, measured with all rays. Others are measured when their first facet is drawn, with
+fewer rays where more would say the same: within .02 (`tests/engine/proxies/test_quick_weights.py`). They follow from
+the species alone, so that no two frames of a film, and no two computers of a farm, have different ones.
 
 Nobody measures anew for a day or an age. Plants with fewer leaves have greater weights, as less hides behind them: the
 same species is measured with all of its leaves, some, and none (`SHARES`), and in a few stages of its life. The inverse
@@ -33,7 +29,6 @@ import numpy as np
 from ..arrays import GOLDEN_TURN, Floats, Floats32, Integers, Mask, Table, spiral, spread
 from ..compiled.clumping import PlantElements, basis, elements_of, fingerprint
 from ..compiled.flora import Flora, compile_species
-from ..compiled.recorded_sizes import crowds, of_dense_stand
 from ..growth.foliage import are_solids
 from ..growth.growth import trunks
 from ..growth.hashing import mix
@@ -175,10 +170,7 @@ def digest(flora: Flora, number: int) -> str:
 @cache
 def shipped() -> dict[str, Floats32]:
     """Weights (2, r, k) of the shipped species and their variants by `digest`."""
-    try:
-        table = json.loads(TABLE.read_text(encoding="utf-8"))
-    except FileNotFoundError:
-        return {}
+    table = json.loads(TABLE.read_text(encoding="utf-8"))
     return {digest: np.array([one["whole"], one["own"]], np.float32) for digest, one in table.items()}
 
 
@@ -279,8 +271,10 @@ def _fitted(
         facets = sight.facets(side, copies)
         blocked = copies * sum(map(len, met))
         stride = _stride(blocked, rays, views[0].covered(facets))
-        least = [least_weights(view.coarser(stride), facets) for view in views]
-        out[k] = _weight(np.concatenate(least), max(round(blocked / stride**2), 1))
+        coarser = (replace(view, spacing=view.spacing * stride) for view in views)
+        least = [least_weights(view, facets) for view in coarser]
+        least, number = np.concatenate(least), max(round(blocked / stride**2), 1)
+        out[k] = np.partition(least, number - 1)[number - 1] if number <= len(least) else LARGEST
         yield 0.5 + 0.5 * (k + 1) / len(COUNTS)
         if expected > _MOST or (sight.leaf > side**2).all():
             break
@@ -294,11 +288,6 @@ def _stride(blocked: float, rays: float, pairs: float) -> int:
         return 1
     most = np.sqrt(max(blocked / rays, pairs / (_PAIRS * rays)))
     return int(np.clip(most, 1.0, max(1.0, np.sqrt(4.0 * blocked / rays))))
-
-
-def _weight(least: Floats, met: int) -> float:
-    """Weight with which ``met`` rays are blocked, from the least weight (n,) with which each ray is."""
-    return float(np.partition(least, met - 1)[met - 1]) if met <= len(least) else LARGEST
 
 
 #: Siblings that are seen side by side, at most.
@@ -320,10 +309,6 @@ class View:
     def flat(self, vectors: Floats) -> Floats:
         """Vectors (n, 3) on the plane (n, 2), in units of the lattice."""
         return vectors @ np.stack([self.u, self.v], axis=1) / self.spacing
-
-    def coarser(self, stride: int) -> Self:
-        """The same with each so many-th line of the lattice only."""
-        return replace(self, spacing=self.spacing * stride)
 
     def covered(self, facets: Facets) -> float:
         """How many rays facets of the maximum weight block, from all directions, one behind the other."""
@@ -486,23 +471,6 @@ def states_of(flora: Flora, number: int) -> tuple[int, ...]:
     return tuple(range(first, max(last, int(flora.species[number].crowded)) + 1))
 
 
-def variants(species: Species) -> Iterator[tuple[str, Flora]]:
-    """All variants of a species of which weights are needed on any day and at any age, each with a name."""
-    plain = compile_species([species])
-    shares = SHARES if species.year is not None else SHARES[:2]
-    for share in shares:
-        yield f"{species.identifier} {share:g}", _with_leaves(plain.species[0], share)
-    every = [(species, "", ages_measured(species))]
-    if len(every[0][2]) > 1 and crowds(species):
-        dense, dies = of_dense_stand(species), ages_of(species).lifespan
-        yield from ((f"{species.identifier} dense {s:g}", _with_leaves(dense, s)) for s in shares)
-        every.append((dense, " dense", [age for age in ages_measured(dense) if age < dies]))
-    for one, kind, ages in every:
-        for years in ages:
-            if years != 0.0:
-                yield f"{species.identifier}{kind} {years:g} years", _at_age(one, years)
-
-
 def ages_measured(species: Species) -> list[float]:
     """Ages of which weights are measured, rising; 0.0 stands for the full one."""
     ages = ages_of(species)
@@ -545,7 +513,7 @@ def weights_of(flora: Flora, number: int, states: tuple[int, ...], known: Known)
     out = np.ones((2, max(states) + 1, len(rows), len(COUNTS)))
     if own.aged is None:
         for state in states:
-            out[:, state] = known(flora, number) if state == 0 else known(_with_leaves(own, SHARES[state]), 0)
+            out[:, state] = known(flora, number) if state == 0 else known(with_leaves(own, SHARES[state]), 0)
         return out
     described, years = own.aged
 
@@ -553,13 +521,13 @@ def weights_of(flora: Flora, number: int, states: tuple[int, ...], known: Known)
         return 1.0 / np.clip(known(some, 0)[:, _alike(rows, some.rows)], _LOWEST_WEIGHT, _HIGHEST_WEIGHT)
 
     around, place = _around(described, years)
-    ends = [inverse(_at_age(described, one)) for one in around]
+    ends = [inverse(compiled_at_age(described, one)) for one in around]
     grown = ends[0] + place * (ends[-1] - ends[0])
     out[:, 0] = 1.0 / grown if 0 in states else 1.0
-    full = _at_age(described, 0.0)
+    full = compiled_at_age(described, 0.0)
     for state in sorted({*states} - {0}):
         # Leaves that are gone change as much of what hides behind others as when the plant is full-grown.
-        all_leaves, some = inverse(full), inverse(_with_leaves(full.species[0], SHARES[state]))
+        all_leaves, some = inverse(full), inverse(with_leaves(full.species[0], SHARES[state]))
         hidden = np.maximum(all_leaves - 1.0, 0.05)
         left = np.clip((some - all_leaves) / hidden, -1.0, 0.5)
         out[:, state] = 1.0 / np.clip(
@@ -596,12 +564,13 @@ def _alike(rows: Table, other: Table) -> Integers:
 
 
 @lru_cache(maxsize=64)
-def _at_age(described: Species, years: float) -> Flora:
+def compiled_at_age(described: Species, years: float) -> Flora:
+    """A species at an age, compiled; 0.0 stands for the full one."""
     return compile_species([with_age(described, years)])
 
 
 @lru_cache(maxsize=64)
-def _with_leaves(species: Species, share: float) -> Flora:
+def with_leaves(species: Species, share: float) -> Flora:
     """A compiled species with a part of its leaves."""
     # What is compiled has its quality and habit already.
     species = replace(species, quality=1.0, habit=0.0)

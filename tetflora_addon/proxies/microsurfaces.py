@@ -6,14 +6,12 @@ Each facet takes its place, orientation and color from a leaf or branch that the
 sub-plant, or from a sample on the faces of an asset. Facets are about as large as a pixel; on average they keep the
 area and orientation of the plants.
 
-Each lies in a plane of the faces of leaves, drawn in proportion to their areas: a leaf that is folded along its midrib
-shows less to the sky than a flat one and scatters more light aside, and a spray of needles has no plane at all. Facets
-in the plane of a leaf's own axes made beeches a quarter too bright from above.
+Each lies in a plane of the faces of leaves, drawn in proportion to their areas: a folded leaf shows less to the sky
+than a flat one, and a spray of needles has no plane. With leaves' own axes beeches were a quarter too bright.
 """
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import lru_cache
 from typing import Self
 
 import numpy as np
@@ -36,10 +34,10 @@ from ..refinement.shared_parts import AssetParts, PlacedAssets
 from ..subplants.pieces import Pieces, Thin, wood_areas
 from .hotspots import LightRatios
 
-_FACET_PATH = 1 << 40  # child indices of facets start here
-_WOOD_PATH = 1 << 41
-# Draws of this module. Wood and leaves have draws of their own; none may coincide, or facets bunch up.
-_LEAF_COUNT, _WOOD_COUNT, _TURN, _START, _PLACE = 201, 202, 203, 204, 205
+# Where child indices of facets of leaves and of wood start, and draws of their numbers; then other draws of this
+# module. None may coincide, or facets bunch up.
+_PATHS = {True: (1 << 40, 201), False: (1 << 41, 202)}
+_TURN, _START, _PLACE = 203, 204, 205
 _MOVE = 211  # three draws from here on
 _FACE = 214
 _GOLDEN = (np.sqrt(5) - 1) / 2
@@ -186,7 +184,7 @@ def facet_sites(
 
 def _in_a_face(flora: Flora, row: NDArray, key: Keys, frame: NDArray) -> tuple[NDArray, NDArray]:
     """Two axes (n, 3), (n, 3) in a face of leaves with axes (n, 3, 3) that branches of the rows (n,) bear."""
-    planes = leaf_planes(flora)
+    planes = flora.face_planes
     number = row * planes.shape[1] + (uniform(key, _FACE) * planes.shape[1]).astype(np.int64)
     # By component, see `products`.
     x, y, z = np.moveaxis(frame, 2, 0)
@@ -235,7 +233,7 @@ def _leaves_of_subplants(flora: Flora, subplants: Branches, rules: FacetRules) -
     rows, points = flora.rows, flora.samples.leaves
     one, all_ = flora.one_leaf_area(subplants), flora.leaf_areas(subplants)
     facet = np.maximum(rules.leaf**2, one)
-    made = facet_sites(subplants.key, all_, facet, _FACET_PATH, _LEAF_COUNT, rules.explicit)
+    made = facet_sites(subplants.key, all_, facet, *_PATHS[True], rules.explicit)
     made = _at_samples(flora, points, subplants, made)
     frame = products(made.frame, gathered(points.frame, made.sample).astype(np.float64))
     frame = settled(rows, made.row, frame, points.light[made.sample].astype(np.float64), _SKY)
@@ -245,21 +243,16 @@ def _leaves_of_subplants(flora: Flora, subplants: Branches, rules: FacetRules) -
     # Sub-plants beyond the limbs know how far outside they are, which holds for all that grows on them.
     outward = np.where(rows["outward"][subplants.row[owner]], points.outward[made.sample], subplants.outward[owner])
     places = outward, points.young[made.sample]
-    found = _leaf_facets(flora, subplants, made, rules, one, places, _carried(flora, subplants, made))
+    found = _leaf_facets(flora, subplants, made, rules, one, places)
     of_day = None if subplants.year is None else _of_kinds(flora, subplants, owner, rows["leaf_kind"][made.row])
-    return found if of_day is None else replace(found, side=found.side * np.sqrt(of_day))
+    side = found.side if of_day is None else found.side * np.sqrt(of_day)
+    return replace(found, side=side, velocity=_carried(flora, subplants, made))
 
 
 def _leaf_facets(
-    flora: Flora,
-    branches: Branches,
-    made: FacetSites,
-    rules: FacetRules,
-    one: Floats,
-    places: tuple[Floats, Floats],
-    velocity: Floats | None,
+    flora: Flora, branches: Branches, made: FacetSites, rules: FacetRules, one: Floats, places: tuple[Floats, Floats]
 ) -> Facets:
-    """Facets at sites (m) at leaves of branches (n).
+    """Facets at rest at sites (m) at leaves of branches (n).
 
     A leaf of these has an area ``one`` (n,), m²; ``places`` (m,) are those between inside and outside and on the shoot.
     """
@@ -273,7 +266,7 @@ def _leaf_facets(
     # What is mirrored and meets another leaf is lost as such.
     left = np.minimum(weight if lit is None else weight * lit.hotspot[owner], 1.0)
     side, stretch = np.sqrt(made.area * weight), np.ones(len(owner))
-    look = color, flora.leaf.transmission[row], velocity
+    look = color, flora.leaf.transmission[row]
     return Facets(made.center, across, along, side, *look, stretch=stretch, dull=1.0 - left * (1.0 - dull))
 
 
@@ -301,7 +294,7 @@ def _leaves_of_pieces(
         one = one * shown / np.maximum(number, 1e-300)
     facet, areas = np.maximum(rules.leaf**2, one), piece_leaves(flora, pieces)[1]
     start = leaf_start(rows, branches)
-    made = _along(flora, pieces, areas, facet, start, _FACET_PATH, _LEAF_COUNT, rules.explicit)
+    made = _along(flora, pieces, areas, facet, start, True, rules.explicit)
     if whole is None:
         bearers = np.flatnonzero(np.bincount(made.owner, minlength=len(branches)))  # many pieces get no facet
         own, of = branches.take(bearers), np.searchsorted(bearers, made.owner)
@@ -317,12 +310,12 @@ def _leaves_of_pieces(
     if own.later is not None:
         there = place_leaves(rows, own.moved(), lines.later, made.leaves.branch, made.index, made.key, made.t)
         velocity = (there.position - made.leaves.position) / moment(rows)
-    return _leaf_facets(flora, branches, made, rules, one, places, velocity)
+    return replace(_leaf_facets(flora, branches, made, rules, one, places), velocity=velocity)
 
 
 def _wood_of_subplants(flora: Flora, subplants: Branches, rules: FacetRules) -> Facets:
     points, wood = flora.samples.wood, flora.wood_areas(subplants) / 2
-    made = facet_sites(subplants.key, wood, rules.wood_side**2, _WOOD_PATH, _WOOD_COUNT, rules.explicit)
+    made = facet_sites(subplants.key, wood, rules.wood_side**2, *_PATHS[False], rules.explicit)
     made = _at_samples(flora, points, subplants, made).thinned(rules.thin, STRETCH)
     axis = np.einsum("nij,nj->ni", made.frame, points.frame[made.sample, :, 2].astype(np.float64))
     return _strips(flora, made, rules, axis, _carried(flora, subplants, made))
@@ -330,7 +323,7 @@ def _wood_of_subplants(flora: Flora, subplants: Branches, rules: FacetRules) -> 
 
 def _wood_of_pieces(flora: Flora, pieces: Pieces, rules: FacetRules) -> Facets:
     none, wood = np.zeros(len(pieces)), wood_areas(flora, pieces) / 2
-    made = _along(flora, pieces, wood, rules.wood_side**2, none, _WOOD_PATH, _WOOD_COUNT)
+    made = _along(flora, pieces, wood, rules.wood_side**2, none, False)
     owner, t, velocity = made.owner, made.t, None
     part = (t - pieces.t0[owner]) / np.maximum(pieces.t1 - pieces.t0, 1e-12)[owner]
     span = (pieces.end - pieces.start)[owner]
@@ -367,8 +360,7 @@ def _along(
     area: Floats,
     facet: Floats,
     start: Floats,
-    path: int,
-    draw: int,
+    leafy: bool,
     explicit: Floats | None = None,
 ) -> FacetSites:
     """Facets of pieces, and their places along the branch; see `facet_sites`.
@@ -383,8 +375,8 @@ def _along(
     first = np.maximum(pieces.t0, start)
     length = np.maximum(pieces.t1 - first, 0.0)
     part = np.where(length > 0, np.maximum(high - low, length) / np.maximum(length, 1e-12), 0.0)
-    numbered = mix(pieces.branches.key ^ (number.astype(np.uint64) + np.uint64(path)))
-    made = facet_sites(numbered, area * part, facet, path, draw, explicit)
+    numbered = mix(pieces.branches.key ^ (number.astype(np.uint64) + np.uint64(_PATHS[leafy][0])))
+    made = facet_sites(numbered, area * part, facet, *_PATHS[leafy], explicit)
     owner = made.owner
     t = low[owner] + (high - low)[owner] * ((uniform(numbered, _PLACE)[owner] + made.index * _GOLDEN) % 1.0)
     made = replace(made, t=t, row=pieces.branches.row[owner])
@@ -407,40 +399,6 @@ def _leaf_colors(
     return np.clip(mean + gathered(flora.rows["leaf_color"][:, 1], row) * deviation[:, None], 0, 1)
 
 
-#: Planes of each kind of leaf: quantiles of the areas of its faces.
-_PLANES = 32
-
-
-@lru_cache(maxsize=8)
-def leaf_planes(flora: Flora) -> Floats:
-    """Rotations (r, `_PLANES`, 3, 3) from axes of a face to those of the leaf that each row's own branch bears.
-
-    The third axis is the normal of the face, the second as near as may be to the leaf's midrib. Each stands for the
-    same area.
-    """
-    rows = flora.rows
-    own = np.stack([rows["species"], rows["leaf_kind"]], axis=1)
-    kinds, kind = np.unique(own, axis=0, return_inverse=True)
-    return np.array([_planes_of(flora, s, k) for s, k in kinds.tolist()])[kind.ravel()]
-
-
-def _planes_of(flora: Flora, species: int, kind: int) -> Floats:
-    """Rotations (`_PLANES`, 3, 3) of a kind of leaves of a species."""
-    vectors = np.concatenate([np.zeros((0, 3)), *(model.face_vectors for model in flora.forms[species][kind])])
-    areas = np.linalg.norm(vectors, axis=1)
-    if areas.sum() <= 0.0:
-        return np.tile(np.eye(3), (_PLANES, 1, 1))
-    # Faces that are turned alike lie side by side, so that quantiles tell them apart.
-    normals = vectors / np.maximum(areas, 1e-300)[:, None]
-    order = np.lexsort(np.round(normals, 6).T)
-    share = np.cumsum(areas[order]) / areas.sum()
-    normal = normals[order[np.searchsorted(share, (np.arange(_PLANES) + 0.5) / _PLANES)]]
-    along = np.array([0.0, 1.0, 0.0]) - normal[:, 1:2] * normal
-    length = np.linalg.norm(along, axis=1, keepdims=True)
-    along = np.where(length > 1e-6, along / np.maximum(length, 1e-6), perpendicular(normal))
-    return np.stack([np.cross(along, normal), along, normal], axis=2)
-
-
 def by_number(table: NDArray[np.floating], row: Integers, count: Floats, counts: Floats) -> Floats:
     """Weights (n,) of rows (n,) of a table (r, k) for ``counts`` (k,) of facets, for numbers of facets (n,) between."""
     place = np.log(np.maximum(count, 1e-12) / counts[0]) / np.log(counts[1] / counts[0])
@@ -449,9 +407,9 @@ def by_number(table: NDArray[np.floating], row: Integers, count: Floats, counts:
     return table[row, low] + (place - low) * (table[row, low + 1] - table[row, low])
 
 
-#: Child indices of facets of leaves and of wood start here; draws of their numbers, turns and places.
-_ASSET_LEAF_PATH, _ASSET_WOOD_PATH = 1 << 42, 1 << 43
-_ASSET_LEAF_COUNT, _ASSET_WOOD_COUNT, _ASSET_TURN, _ASSET_MOVE = 252, 253, 254, 255
+#: As `_PATHS`, and draws of turns and places.
+_ASSET_PATHS = {True: (1 << 42, 252), False: (1 << 43, 253)}
+_ASSET_TURN, _ASSET_MOVE = 254, 255
 #: Sides of a facet by which one is moved that has the sample of another.
 _ASSET_MOVED = 1.5
 
@@ -476,11 +434,8 @@ def facets_of_assets(
     """
     weight = asset_weights(placed, parts, totals.optical_area / np.maximum(leaf, 1e-12) ** 2)
     key, made = placed.keys(parts), []
-    for leafy, area, side, *draws in (
-        (True, totals.leaf_area, leaf, _ASSET_LEAF_PATH, _ASSET_LEAF_COUNT),
-        (False, totals.wood_area / 2, wood, _ASSET_WOOD_PATH, _ASSET_WOOD_COUNT),
-    ):
-        own = facet_sites(key, area, side**2, *draws, left_out)
+    for leafy, area, side in ((True, totals.leaf_area, leaf), (False, totals.wood_area / 2, wood)):
+        own = facet_sites(key, area, side**2, *_ASSET_PATHS[leafy], left_out)
         sample = placed.picked(parts, key, leafy, own.owner, own.index)
         made.append(_placed(placed, parts, replace(own, sample=sample), leafy, weight[own.owner]))
     return Facets.concatenate(made)

@@ -16,7 +16,7 @@ from typing import TypeVar
 import numpy as np
 
 from ..arrays import Arrays, Floats, Floats32
-from ..buffers import MeshBuffers, PointBuffers
+from ..buffers import MeshBuffers, PointBuffers, separate_polygons
 from ..camera.camera import Camera
 from .microsurfaces import CIRCUMRADIUS, SIN_60, Facets
 
@@ -101,23 +101,10 @@ def shape_buffers(shapes: DrawnShapes) -> MeshBuffers | PointBuffers:
     if shapes.radius is not None:
         still = shapes.velocity is None
         return PointBuffers(shapes.place, shapes.radius, looks if still else {**looks, "velocity": shapes.velocity})
-    n, attributes = len(shapes), {name: ("FACE", values) for name, values in looks.items()}
-    every = np.arange(3 * n, dtype=np.int32).reshape(n, 3)
+    attributes = {name: ("FACE", values) for name, values in looks.items()}
     if shapes.velocity is not None:
         attributes["velocity"] = "POINT", np.repeat(shapes.velocity, 3, axis=0)
-    return MeshBuffers(
-        positions=shapes.place.reshape(-1, 3),
-        edge_verts=np.stack([every, np.roll(every, -1, axis=1)], axis=2).reshape(-1, 2),
-        corner_verts=every.ravel(),
-        corner_edges=every.ravel().copy(),
-        face_offsets=np.arange(n + 1, dtype=np.int32) * np.int32(3),
-        attributes=attributes,
-    )
-
-
-def facet_mesh(facets: Facets) -> MeshBuffers:
-    """Facets as a mesh of triangles."""
-    return shape_buffers(triangles_of(facets))
+    return separate_polygons(shapes.place, attributes)
 
 
 def cover_for_light(facets: Facets, sun: Floats | None) -> Floats:

@@ -327,3 +327,26 @@ def area_fractions(weights: Floats) -> Floats:
 
 
 _NOTHING = Meshes((), np.zeros(0, np.int32), np.zeros((0, 4, 4)))
+
+
+#: Part of a face that may be missing through rounding errors alone.
+_WHOLE = 1e-6
+
+
+def mended(polygons: Polygons) -> Polygons:
+    """The same polygons, with a face in place of its first fragment where all of its fragments are there."""
+    cut = np.flatnonzero(polygons.part >= 0)
+    if not len(cut):
+        return polygons
+    meshes = polygons.meshes
+    key = polygons.instance[cut].astype(np.int64) * len(meshes.face_size) + polygons.face[cut]
+    _, first, number = np.unique(key, return_index=True, return_inverse=True)
+    number = number.reshape(-1)
+    there = np.bincount(number, area_fractions(polygons.weights)[polygons.part[cut]])
+    complete = there >= meshes.face_size[polygons.face[cut[first]]] - 2 - _WHOLE
+    part = polygons.part.copy()
+    part[cut[complete[number]]] = -1
+    stays = np.ones(len(polygons), bool)
+    stays[cut[complete[number]]] = False
+    stays[cut[first[complete]]] = True
+    return replace(polygons, part=part).take(stays)

@@ -11,9 +11,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from tests.engine import support
 from tetflora_addon.camera.camera import Camera
 from tetflora_addon.proxies.microsurfaces import Facets, pushed_outside_view
-from tetflora_addon.proxies.primitives import facet_mesh
 
 KINDS = ("PERSP", "ORTHO")
 
@@ -72,8 +72,8 @@ def test_facets_beside_the_view_do_not_reach_into_it(stretch):
     a, b = np.linalg.qr(random.normal(size=(n, 3, 2)))[0].transpose(2, 0, 1)
     facets = Facets(center, a, b, random.uniform(0.5, 4, n), np.zeros((n, 3)), np.zeros(n))
     facets = replace(facets, stretch=None if stretch is None else np.full(n, stretch))
-    shrunk = facet_mesh(pushed_outside_view(facets, camera.distance_to_view))
-    assert camera.distance_to_view(facet_mesh(facets).positions.astype(float)).min() < -0.1  # they did reach in
+    shrunk = support.facet_mesh(pushed_outside_view(facets, camera.distance_to_view))
+    assert camera.distance_to_view(support.facet_mesh(facets).positions.astype(float)).min() < -0.1  # they did reach in
     assert camera.distance_to_view(shrunk.positions.astype(float)).min() > -1e-4
     same = pushed_outside_view(facets, lambda points: np.full(len(points), np.inf))
     assert (same.side == facets.side).all()

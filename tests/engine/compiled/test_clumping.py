@@ -28,8 +28,8 @@ from tetflora_addon.compiled.clumping import (
 from tetflora_addon.compiled.flora import Flora
 from tetflora_addon.growth.growth import trunks
 from tetflora_addon.growth.seeds import Seeds
-from tetflora_addon.proxies.summaries import Summaries, extinction_matrices, summarize
 from tetflora_addon.refinement.contents import Contents, InCells, subplant_totals
+from tetflora_addon.refinement.summaries import Summaries, extinction_matrices, summarize
 
 seeds = st.integers(0, 2**31)
 

@@ -18,14 +18,13 @@ from tests.engine import support
 from tests.engine.assets import trees
 from tests.engine.emission.test_emission import with_decision
 from tests.engine.refinement.test_asset_parts import check_cover, grove, placed_of, run
+from tetflora_addon.assets.costs import NEVER, OriginalPolicy
 from tetflora_addon.camera.camera import Camera
 from tetflora_addon.emission import drawing
 from tetflora_addon.emission.asset_plan import (
     ASSETS,
-    NEVER,
     AssetPlan,
     ClusterRows,
-    OriginalPolicy,
     PlacedClusters,
     explicit_plan,
 )

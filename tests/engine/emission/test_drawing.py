@@ -19,7 +19,7 @@ from tetflora_addon.emission import drawing as subject
 from tetflora_addon.emission.budget import fit_to_budget
 from tetflora_addon.emission.coverage import MARGIN, Coverage, Shade
 from tetflora_addon.emission.emitters import FacetForm, facet_blocks
-from tetflora_addon.emission.frontier import Frontier
+from tetflora_addon.emission.frontier import Frontier, Waiting
 from tetflora_addon.emission.plants import GrownPlants, Transition, expanded_blocks
 from tetflora_addon.growth.growth import trunks
 from tetflora_addon.proxies.facet_weights import facet_weights
@@ -404,6 +404,23 @@ def test_every_part_is_decided_once() -> None:
     assert set(every.branches.plant.tolist()) == set(range(len(seeds)))
     area, whole = every.totals.optical_area.sum(), subplant_totals(flora, trunks(flora.rows, seeds)).optical_area.sum()
     assert area == pytest.approx(whole, rel=0.05)  # plants differ in leaves
+
+
+def test_each_part_is_decided_with_the_depth_of_its_own_cell(monkeypatch: pytest.MonkeyPatch) -> None:
+    """However many slabs others have waited for."""
+    flora, _, camera, result = wood()
+    given = support.refined(flora, result, camera, 1.2, 0.6).drawing
+    decided, slabs = Frontier._decided, []
+
+    def checked(self: Frontier, number: int, slab: Waiting, depth: np.ndarray) -> tuple:
+        slabs.append(len(slab))
+        assert (slab.near <= depth).all()
+        return decided(self, number, slab, depth)
+
+    monkeypatch.setattr(Frontier, "_decided", checked)
+    for _ in Frontier(given.kinds, Coverage(camera), given.facet).slabs(given.parts, 2_000.0):
+        pass
+    assert len(slabs) > 5
 
 
 def test_nothing_to_draw() -> None:

@@ -19,9 +19,9 @@ from tetflora_addon.emission import plants
 from tetflora_addon.emission.plants import expanded_blocks, explicit_blocks
 from tetflora_addon.emission.shells import proxy_shells
 from tetflora_addon.growth.seeds import Seeds
-from tetflora_addon.proxies.summaries import summarize
 from tetflora_addon.refinement.decisions import Decision
 from tetflora_addon.refinement.loop import Refinement
+from tetflora_addon.refinement.summaries import summarize
 from tetflora_addon.tetrahedra.geometry import volume
 
 

@@ -132,9 +132,10 @@ def test_as_many_are_made(name, monkeypatch):
     result = run_to_end(refine(flora, seeds, camera, SETTINGS))
     detail = budget.fit_to_budget(result, camera, SETTINGS)
     view = detail.camera
-    how = Transition(flora, view, detail.leaf_limit, detail.tolerance), detail.facet, facet_weights(flora)
+    how = Transition(flora, view, detail.leaf_limit, detail.tolerance), facet_weights(flora)
+    options = {"facet": detail.facet, "hidden": detail.coarser}
     made = 0
-    for one in drawn_blocks(drawing(flora, detail.refinement, view, *how, detail.coarser)):
+    for one in drawn_blocks(drawing(flora, detail.refinement, *how, **options)):
         if isinstance(one, Parts):
             made += sum(len(facets) for facets, _ in one)
         elif isinstance(one, Block):

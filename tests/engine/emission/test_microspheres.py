@@ -19,7 +19,6 @@ from tetflora_addon.proxies.microsurfaces import Facets
 from tetflora_addon.proxies.primitives import (
     LEAST_COVER,
     SKYLIGHT,
-    facet_mesh,
     facing,
     joined,
     shape_buffers,
@@ -51,7 +50,7 @@ def test_what_a_facet_covers_for_the_camera_its_sphere_covers(kind: str) -> None
     """By the corners of the facets themselves, projected; but for those that are seen from their edge."""
     facets, view = squares(), camera(kind)
     made = shape_buffers(spheres_of(facets, view))
-    vectors = support.face_vectors(facet_mesh(facets))
+    vectors = support.face_vectors(support.facet_mesh(facets))
     sight = np.array([0.0, 1.0, 0.0]) if kind == "ORTHO" else unit(facets.center - EYE)
     shown = np.abs((vectors * sight).sum(axis=1))
     edge = facing(facets, view) < LEAST_COVER
@@ -70,7 +69,7 @@ def skylight(number: int = 4000) -> np.ndarray:
 def test_what_nobody_sees_casts_the_same_shadow_on_average_over_light_from_the_sky() -> None:
     """Of an even one, as it falls on level ground. Leaves that lie level cast more than those that hang."""
     facets = squares(3000)
-    vectors = support.face_vectors(facet_mesh(facets))
+    vectors = support.face_vectors(support.facet_mesh(facets))
     for sun in (None, np.array([0.6, 0.0, -0.8])):  # below the horizon
         made = shape_buffers(spheres_of(facets, None, sun=sun))
         assert discs(made.radius) == pytest.approx(np.abs(vectors @ skylight().T).mean(axis=1), rel=0.03)

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tests.engine.refinement.test_polygons import SEEDS, divided, grove, placed, thicket
+from tests.engine.refinement.test_polygons import SEEDS, grove, placed, thicket
 from tetflora_addon.emission.polygons import chosen_facets
 from tetflora_addon.refinement.polygons import Polygons
 
@@ -18,8 +18,7 @@ from tetflora_addon.refinement.polygons import Polygons
 @settings(deadline=None, max_examples=12)
 def test_facets_do_not_depend_on_what_else_is_held(seed: int, side: float) -> None:
     """Without one of many polygons, in any order, all others have the facets that they had; all lie on their faces."""
-    _, held = divided(Polygons.everything(placed(thicket(seed, 30), seed)), seed, 0.0)
-    polygons = held.items
+    polygons = Polygons.everything(placed(thicket(seed, 30), seed))
     rng = np.random.default_rng(seed)
     optical, sides = polygons.areas(), np.full(len(polygons), side)
 

@@ -26,7 +26,7 @@ from tetflora_addon.growth.rows import ROW_DTYPE
 from tetflora_addon.growth.wind import Wind, gusts, leaned, sway, widest_sway
 from tetflora_addon.proxies.facet_weights import facet_weights
 from tetflora_addon.proxies.microsurfaces import FacetRules, Facets, piece_facets, subplant_facets
-from tetflora_addon.proxies.primitives import facet_mesh, joined, shape_buffers, spheres_of
+from tetflora_addon.proxies.primitives import joined, shape_buffers, spheres_of
 from tetflora_addon.subplants.pieces import expand, open_subplants
 
 _FLOAT32 = 1e-6
@@ -308,7 +308,7 @@ def test_facets_move_with_what_bears_them(kind: str) -> None:
         for some in (now.transmission > 0.0, now.transmission == 0.0):
             assert not some.any() or np.median(error[some]) < 0.03 * np.linalg.norm(way, axis=1).max()
         assert np.linalg.norm(now.velocity, axis=1).max() > 0.01
-        mesh = facet_mesh(now)
+        mesh = support.facet_mesh(now)
         np.testing.assert_array_equal(mesh.attributes["velocity"][1][::3], now.velocity.astype(np.float32))
         points = shape_buffers(spheres_of(now, None))
         np.testing.assert_array_equal(points.attributes["velocity"], now.velocity.astype(np.float32))

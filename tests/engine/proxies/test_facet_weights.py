@@ -9,6 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from devtools import facet_tables
 from tests.engine import support
 from tetflora_addon.camera.camera import Camera
 from tetflora_addon.compiled.flora import Flora, compile_species
@@ -19,7 +20,6 @@ from tetflora_addon.growth.seasons import Season
 from tetflora_addon.jobs import run_to_end
 from tetflora_addon.proxies import facet_weights as subject
 from tetflora_addon.proxies.microsurfaces import CIRCUMRADIUS, FacetRules, piece_facets, subplant_facets
-from tetflora_addon.proxies.primitives import facet_mesh
 from tetflora_addon.refinement.contents import piece_totals, subplant_totals
 from tetflora_addon.refinement.rasterize import occluder_depth
 from tetflora_addon.species.catalog import list_species, load_species
@@ -64,7 +64,7 @@ def as_facets(flora: Flora, seeds, opened: int, side: float, weights: subject.Fa
     share = subject.leaf_shares(flora, some)
     weight = None if weights is None else weights.of_subplants(some.row, area / side**2, share)
     out.append(subplant_facets(flora, some, FacetRules(np.full(len(some), side), weight=weight)))
-    return [triangles(facet_mesh(f)) for f in out if len(f)]
+    return [triangles(support.facet_mesh(f)) for f in out if len(f)]
 
 
 def test_opened_plants_of_other_seeds_are_as_opaque() -> None:
@@ -111,7 +111,7 @@ def test_tables_of_shipped_species_are_those_of_today() -> None:
 
 def test_every_shipped_species_has_a_table() -> None:
     for identifier in list_species():
-        for name, flora in subject.variants(load_species(identifier)):
+        for name, flora in facet_tables.variants(load_species(identifier)):
             assert subject.digest(flora, 0) in subject.shipped(), name
 
 

@@ -11,7 +11,7 @@ from tetflora_addon.compiled.flora import compile_species
 from tetflora_addon.compiled.orientation import leaf_moments
 from tetflora_addon.growth.growth import trunks
 from tetflora_addon.growth.seeds import Seeds
-from tetflora_addon.proxies.microsurfaces import FacetRules, leaf_planes, subplant_facets
+from tetflora_addon.proxies.microsurfaces import FacetRules, subplant_facets
 from tetflora_addon.species.catalog import load_species
 
 SPECIES = ("beech", "oak", "palm", "willow", "spruce")
@@ -20,7 +20,7 @@ SPECIES = ("beech", "oak", "palm", "willow", "spruce")
 @pytest.mark.parametrize("identifier", SPECIES)
 def test_planes_are_rotations_and_as_the_faces_of_leaves(identifier: str) -> None:
     flora = compile_species([load_species(identifier)])
-    planes = leaf_planes(flora)
+    planes = flora.face_planes
     assert np.allclose(planes @ planes.swapaxes(2, 3), np.eye(3), atol=1e-12)
     assert np.allclose(np.linalg.det(planes), 1.0)
     for row, kind in enumerate(flora.rows["leaf_kind"].tolist()):

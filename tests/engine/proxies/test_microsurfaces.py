@@ -17,12 +17,11 @@ from tetflora_addon.growth.growth import trunks
 from tetflora_addon.growth.seeds import Branches
 from tetflora_addon.optics import GLOSS
 from tetflora_addon.proxies.microsurfaces import CIRCUMRADIUS, STRETCH, FacetRules, subplant_facets
-from tetflora_addon.proxies.primitives import facet_mesh
 from tetflora_addon.refinement.contents import subplant_totals
 
 
 def facets(flora: Flora, subplants: Branches, side: float) -> MeshBuffers:
-    return facet_mesh(subplant_facets(flora, subplants, FacetRules(np.full(len(subplants), side))))
+    return support.facet_mesh(subplant_facets(flora, subplants, FacetRules(np.full(len(subplants), side))))
 
 
 def part(mesh: MeshBuffers, leaves: bool) -> np.ndarray:
@@ -60,7 +59,7 @@ def test_small_numbers_are_met_on_average_and_from_all_samples() -> None:
     n = 20_000
     plants = trunks(flora.rows, support.plants(np.arange(n)))
     side = np.sqrt(subplant_totals(flora, plants).leaf_area * 10)
-    mesh = facet_mesh(subplant_facets(flora, plants, FacetRules(side)))
+    mesh = support.facet_mesh(subplant_facets(flora, plants, FacetRules(side)))
     leaves = part(mesh, True)
     assert leaves.sum() == pytest.approx(n / 10, abs=4 * np.sqrt(n * 0.09))
     heights = support.face_centers(mesh)[leaves][:, 2]
@@ -99,7 +98,7 @@ def test_facets_stay_by_their_plant(seed: int, side: float, scale: float) -> Non
     """Centers within the bound, but for half a leaf; corners half a diagonal further."""
     flora = support.small_flora()
     plant = trunks(flora.rows, support.plants(seed, scale=scale, position=(3, 4, 5)))
-    mesh = facet_mesh(subplant_facets(flora, plant, FacetRules(np.array([side * scale]))))
+    mesh = support.facet_mesh(subplant_facets(flora, plant, FacetRules(np.array([side * scale]))))
     assume(mesh.polygons)
     center, radius, half_height = support.bounding_cylinders(flora, plant)
     offset = support.face_centers(mesh) - center

@@ -18,9 +18,9 @@ from ...arrays import Floats, Integers32
 from ...assets import asset_cache
 from ...assets.asset import Asset, AssetSource, AssetTable, Instances
 from ...assets.compiled import compile_steps
+from ...assets.costs import AssetCosts, OriginalPolicy
 from ...camera.camera import Camera
 from ...compiled.flora import Flora, compile_species
-from ...emission.asset_plan import AssetCosts, OriginalPolicy
 from ...emission.budget import BYTES_PER_TRIANGLE, expanded_faces
 from ...errors import SceneError, TetFloraError
 from ...growth.growth import trunks

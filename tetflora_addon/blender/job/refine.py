@@ -540,9 +540,9 @@ def _refined(run: _Run, disc: float) -> Job[EmissionInput]:
     # Light is baked for facets, whatever is made of them then.
     becomes = None if run.baking is not None else form.form(camera, disc, sun_of(refinement.lights))
     view = detail.camera
-    seen = Transition(flora, view, detail.leaf_limit, detail.tolerance), detail.facet, facet_weights(flora)
-    unseen = detail.coarser, given.occluders, becomes, detail.most, run.settings.shadow_cutoff
-    with_all = drawing(flora, refinement, view, *seen, *unseen, clusters)
+    how = Transition(flora, view, detail.leaf_limit, detail.tolerance), facet_weights(flora), clusters, given.occluders
+    options = {"facet": detail.facet, "hidden": detail.coarser, "most": detail.most}
+    with_all = drawing(flora, refinement, *how, form=becomes, shadow=run.settings.shadow_cutoff, **options)
     if run.whole is not None:  # as many as that is expected to have
         pixels = run.whole[0].width * run.whole[0].height / (camera.width * camera.height)
         run.tiles = tiles_of(fit_to_budget(refinement, *run.whole, times=pixels).camera)

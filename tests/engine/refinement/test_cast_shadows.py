@@ -13,8 +13,7 @@ from hypothesis import settings as examples
 from hypothesis import strategies as st
 
 from tests.engine import support
-from tetflora_addon.emission.coverage import ShadowReach
-from tetflora_addon.refinement.lights import Light
+from tetflora_addon.refinement.lights import Light, ShadowReach
 
 #: Looks north from the origin at eye height; a meter beside its axis is out of view near it only.
 CAMERA = support.camera([0.0, 0.0, 1.7], [0.0, 10.0, 1.7])

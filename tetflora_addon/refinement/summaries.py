@@ -11,10 +11,10 @@ from ..arrays import Floats, Integers, chunks, unit
 from ..compiled.clumping import factors
 from ..compiled.flora import Flora
 from ..compiled.orientation import leaf_moments, own_leaf_moments, wood_moments
-from ..refinement.contents import Contents, InCells
-from ..refinement.polygons import MEASURE_BATCH
-from ..refinement.shared_parts import AssetParts, PlacedAssets
 from ..subplants.pieces import Pieces, outward_ends, piece_leaf_colors
+from .contents import Contents, InCells
+from .polygons import MEASURE_BATCH
+from .shared_parts import AssetParts, PlacedAssets
 
 #: κ along an axis is ⟨|n·e|⟩, the moment gives ⟨(n·e)²⟩. The power of the second that is the first at 0, ⅓ (all ways:
 #: ½) and 1; at ½ (normals around a circle) it gives .646 for 2/π = .637.

@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from tetflora_addon.emission.asset_plan import CYCLES_WHOLE, EEVEE_FEW, NEVER, SAFE, AssetCosts
+from tetflora_addon.assets.costs import CYCLES_WHOLE, EEVEE_FEW, NEVER, SAFE, AssetCosts
 
 
 def costs(triangles: list[int], instances: list[int], pixels: list[float] | None = None) -> AssetCosts:

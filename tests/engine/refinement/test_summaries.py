@@ -15,8 +15,8 @@ from tests.engine.refinement.test_loop import run
 from tetflora_addon.compiled.flora import Flora
 from tetflora_addon.growth.growth import trunks
 from tetflora_addon.growth.seeds import Seeds
-from tetflora_addon.proxies.summaries import Summaries, extinction_matrices, summarize
 from tetflora_addon.refinement.contents import Contents, InCells, as_pieces, piece_totals, subplant_totals
+from tetflora_addon.refinement.summaries import Summaries, extinction_matrices, summarize
 from tetflora_addon.tetrahedra.tree import TetrahedralTree
 
 
