@@ -4,6 +4,8 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import bpy
 import pytest
 
@@ -77,7 +79,7 @@ def test_it_stays_when_the_job_is_closed(scene):
 
 def test_esc_in_refine_takes_it_away(scene):
     before = datablocks()
-    steps = TETFLORA_OT_refine.steps(None, bpy.context)
+    steps = TETFLORA_OT_refine.steps(SimpleNamespace(), bpy.context)
     _until_shown(steps, scene)
     next(steps)
     steps.close()
