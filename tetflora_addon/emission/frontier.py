@@ -55,6 +55,44 @@ class Waiting(Arrays):
     count: Floats  # (n,): facets that they would have, all of them
 
 
+class _Pool:
+    """Parts (n) of one kind that wait, in runs: what leaves is cleared, and what comes is joined, only now and then."""
+
+    def __init__(self, first: Waiting) -> None:
+        self._runs = [(first, np.arange(len(first)))]
+
+    def __len__(self) -> int:
+        return sum(len(rows) for _, rows in self._runs)
+
+    def column(self, name: str) -> NDArray:
+        """A column (n,) of `Waiting`."""
+        return np.concatenate([getattr(run, name)[rows] for run, rows in self._runs])
+
+    def _within(self, index: Integers) -> list[tuple[Waiting, Integers]]:
+        """Each run, and its rows among some (k,) of all."""
+        ends = np.cumsum([0, *(len(rows) for _, rows in self._runs)])
+        of = np.searchsorted(ends, index, side="right") - 1
+        return [(run, rows[index[of == k] - ends[k]]) for k, (run, rows) in enumerate(self._runs)]
+
+    def take(self, index: Integers) -> Waiting:
+        """Some (k,) of them, in that order: depths of their cells come in it, too."""
+        runs = np.searchsorted(np.cumsum([len(rows) for _, rows in self._runs]), index, side="right")
+        found = Waiting.concatenate([run.take(rows) for run, rows in self._within(index)])
+        return found.take(np.argsort(np.argsort(runs, kind="stable"))) if len(self._runs) > 1 else found
+
+    def keep(self, index: Integers, later: Sequence[Waiting]) -> int:
+        """Only some (k,) wait still, and others do from now on; how many there were."""
+        number, new = len(self), Waiting.concatenate(later) if later else self.take(np.arange(0))
+        self._runs = [*self._within(index), (new, np.arange(len(new)))]
+        for k in range(len(self._runs) - 1, 0, -1):
+            if 2 * len(self._runs[k][1]) >= len(self._runs[k - 1][1]):
+                joined = Waiting.concatenate([run.take(rows) for run, rows in self._runs[k - 1 : k + 1]])
+                self._runs[k - 1 : k + 1] = [(joined, np.arange(len(joined)))]
+            elif not len(self._runs[k][1]):
+                del self._runs[k]
+        return number
+
+
 class Canvas:
     """Where kinds draw what is seen of them: a tile of the image."""
 
@@ -214,12 +252,12 @@ class Frontier:
 
         In each cell of the image these are the nearest ones, which have no more than about so many facets in all.
         """
-        pools = [self.pool(kind, own) for kind, own in zip(self.kinds, parts, strict=True)]
-        cells = len(np.unique(np.concatenate([pool.cell for pool in pools])))
+        pools = [_Pool(self.pool(kind, own)) for kind, own in zip(self.kinds, parts, strict=True)]
+        cells = len(np.unique(np.concatenate([pool.column("cell") for pool in pools])))
         dense = min(SLAB * CELL**2, FIRST * most / max(cells, 1))
         for pool, *left in zip(pools, self.hidden, self.outside, strict=True):
             for one in left:
-                one.append(pool.take(slice(0)))
+                one.append(pool.take(np.arange(0)))
         while any(map(len, pools)):
             near, depth, order, cells = self._depths(pools, dense)
             ready, first = [], 0
@@ -228,8 +266,7 @@ class Frontier:
                 own = order[(order >= first) & (order < first + len(pool))]
                 begun = (near <= depth)[own]
                 made, later = self._decided(number, pool.take(own[begun] - first), depth[own[begun]])
-                pools[number] = Waiting.concatenate([pool.take(own[~begun] - first), *later])
-                first += len(pool)
+                first += pool.keep(own[~begun] - first, later)
                 ready.append(made)
             # Where much was hidden, or little is left, the next ones are so many more.
             wanted = min(max(SLAB * CELL**2 * cells, LEAST), max(most, 1.0))
@@ -238,13 +275,13 @@ class Frontier:
             if any(map(len, ready)):
                 yield ready
 
-    def _depths(self, pools: Sequence[Waiting], number: float) -> tuple[Floats, Floats, Integers, int]:
+    def _depths(self, pools: Sequence[_Pool], number: float) -> tuple[Floats, Floats, Integers, int]:
         """Least depths (n,) of parts, and those before which they have so many facets in each cell, about.
 
         Also their order (n,) by cell and depth, and how many cells there are.
         """
         every, nearest, count, radius = (
-            np.concatenate([getattr(pool, name) for pool in pools]) for name in ("cell", "near", "count", "radius")
+            np.concatenate([pool.column(name) for pool in pools]) for name in ("cell", "near", "count", "radius")
         )
         deepest = float(np.ptp(nearest)) + 1.0
         order = np.argsort(every * deepest + (nearest - nearest.min()), kind="stable")
