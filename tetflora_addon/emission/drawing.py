@@ -237,14 +237,14 @@ def _tiles(given: Drawing) -> tuple[list[_Item], list[Arrays], list[Shown]]:
             some = kind.opened(kind.met(some.take(np.flatnonzero(wide)), frontier.shown))[0]
         inside.append([kind.ordered(type(some).concatenate(found.pop(0))) for _ in range(number)])
         outside.append(kind.ordered(type(some).concatenate(beyond)))
-    covered, tiles, away = given.covered + _LEAST_SHARE * max(given.covered.mean(), 1.0), [], {}
+    covered, tiles = given.covered + _LEAST_SHARE * max(given.covered.mean(), 1.0), []
     for tile, (first, end) in enumerate(itertools.pairwise(ends.tolist())):
         own = [of[tile] for of in inside]
         if any(map(len, own)):
             tiles.append((tile, (first, end), own, float(covered[first:end].sum() / covered.sum())))
-            pools = map(frontier.pool, frontier.kinds, own)
-            away[tile] = min(pool.near.min(initial=np.inf) for pool in pools)
-    return sorted(tiles, key=lambda item: away[item[0]]) if given.tiles else tiles, outside, frontier.shown
+    if given.tiles:
+        tiles.sort(key=lambda item: min(p.near.min(initial=np.inf) for p in map(frontier.pool, given.kinds, item[2])))
+    return tiles, outside, frontier.shown
 
 
 def _drawn_tile(given: Drawing, item: _Item) -> list[Block | Parts | Shown]:

@@ -127,7 +127,7 @@ def polygons_text(number: float) -> str:
     """A number of polygons in two digits, and few letters: a sidebar has room for no more."""
     number = float(f"{number:.2g}")
     size, unit = (1.0, "") if number < 1e4 else (1e3, " k") if number < _MEGA else (_MEGA, " M")
-    return f"{number / size:,g}{unit} polygons"
+    return f"{number / size:{'g' if number < 10.0 * size else ',.0f'}}{unit} polygons"
 
 
 def _count(scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer) -> Stand | None:
