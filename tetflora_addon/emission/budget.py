@@ -13,8 +13,7 @@ budget; in each part of the image as many are drawn as fill it. Only how many la
 seconds: fitted to the processor's of ``python -m benchmarks estimates``, so that the largest error is least, whenever
 refinement changes; those of what is expanded to plants of three species. Other machines differ by their speed.
 
-A spruce three meters away has a hundred times as many polygons as the same one from afar. Where all is expanded the
-nearest plants are therefore grown to their twigs to ask each branch how fine it will be.
+Where all is expanded, the nearest plants are grown to their twigs to ask each branch how fine it will be.
 """
 
 from collections.abc import Iterator
@@ -38,7 +37,7 @@ from ..subplants.rings import BUD_RINGS, bud_sides, finer, round_up_to
 from ..subplants.tubes import tube_faces
 from .coverage import Coverage
 from .drawing import HIDDEN, HIDDEN_A_PIXEL, HIDDEN_LEAVES, LIT_LEAVES, NEVER_TOO_MANY, OUTSIDE_A_PIXEL, SHADOW, TILE
-from .frontier import DETAIL
+from .frontier import DETAIL, FEWER
 from .plants import BENT, BROAD, NEARER, SIDES, TOLERANCE, TUBES, TWIG, LeafDetail, kite_widths
 
 #: Approximate bytes of a polygon in Blender (110) and in a renderer (500) together.
@@ -52,9 +51,6 @@ A_PIXEL = 12.0
 PLENTY, FINEST = 2_400_000.0, 5.0
 #: What an expected number may be off by.
 RESERVE = 0.15
-#: Where a limit makes facets larger than asked for, there are fewer by this power of their side: each reaches more
-#: pixels, one of which may be open. 1.0 up to one and a half times the side, 1.35 up to four times (birches, full HD).
-_FEWER = 1.3
 #: Leaves of what is instanced are real from widths so many times smaller on than those of plants.
 ASSETS_FINER = 3.6
 #: Least side of facets of instances over that which is asked for. In a wood of 100 trees from the middle distance of
@@ -74,6 +70,7 @@ class Detail:
     #: Pixels by which the margins of near leaves may be off; infinite where only their models are drawn.
     tolerance: float = TOLERANCE
     most: float = np.inf  # polygons and facets that there may be
+    finest: float = 1.0  # sides over those at which what there may be suffices for finer ones
 
     @property
     def asset_limit(self) -> float:
@@ -112,9 +109,9 @@ def fit_to_budget(
     polygons = float(len(result.cell_polygons.polygons))
     covered = times * float(contributions(result.cells, result.transmittance)[result.in_view[result.nodes]].sum())
     number = primitives(covered, camera, settings.facet)
-    coarser = relative_side(number, settings.facet)
+    asked = relative_side(number, settings.facet)
     left = max(most - polygons, 0.01 * most) if np.isfinite(most) else most
-    coarser = max(coarser, (number / left) ** (1.0 / _FEWER))
+    coarser = max(asked, (number / left) ** (1.0 / FEWER))
     pixels = max(1.0 / (coarser * settings.facet), 1.0)
     return replace(
         detail,
@@ -124,6 +121,7 @@ def fit_to_budget(
         coarser=coarser,
         tolerance=pixels * TOLERANCE * max(coarser, 1.0) ** 2,
         most=left,
+        finest=max(asked, min(1.0 / settings.facet, coarser)) / coarser,  # never finer than the image
     )
 
 

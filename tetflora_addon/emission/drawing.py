@@ -32,7 +32,7 @@ from ..refinement.loop import Refinement
 from ..refinement.shared_parts import SharePoints
 from .asset_plan import PlacedClusters
 from .coverage import Coverage, Shade
-from .frontier import DETAIL, FEW, Canvas, Frontier, FrontierKind, Shown, Waiting, Whose, corners_of_faces
+from .frontier import DETAIL, FEW, FEWER, Canvas, Frontier, FrontierKind, Shown, Waiting, Whose, corners_of_faces
 from .plants import Block, GrownPlants, PlantRows, Transition
 from .polygons import FaceRows, Faces
 
@@ -67,16 +67,14 @@ _BESIDE, _THROWN = (0.1, 8.0, 15.0), (0.02, 1.0)
 LARGEST_OUTSIDE, _LEAST_OUTSIDE = 3.0, 0.5
 #: Parts outside that are drawn at a time.
 _OUTSIDE_BATCH = 20_000
-#: Fraction of what a tile may have from which on all that is left counts as hidden, and part of that from which on the
-#: rest is the coarser the less is left. It lies behind what is drawn already, and is seen through its gaps.
-_FULL, _SPARE = 0.85, 0.75
-#: Least part of that which counts as left: facets have seven times the side then.
-_LEAST_LEFT = 0.005
-#: Largest sides in a tile over those that it began with, from which on it is drawn again, coarser from the beginning:
-#: too little was left of its polygons for what lies behind, which would be shards among fine leaves. Sides grow by this
-#: power of their mean (with all of it, 40 % of a tile's polygons were left), at least by this of what is too much; and
-#: it is drawn so often at most.
-UNEVEN, _MEAN, _AGAIN, _TRIES = 2.0, 0.7, 0.2, 5
+#: Fraction of what a tile may have that is for what is seen; beyond, all that is left counts as hidden.
+_FULL = 0.85
+#: Layers of all that a tile draws, were they drawn at random: pixels stay open with the probability exp(-_LAYERS), 4.1
+#: to 5.4 layers for birches and spruces. What was expected counts as this part of them.
+_LAYERS, _EXPECTED = 5.0, 0.5
+#: Largest sides in a tile over those that it began with: shards would show among fine leaves. A tile that is not
+#: complete so, or whose sides are so many times what they may be, is drawn again, so often at most.
+UNEVEN, _LARGER, _TRIES = 3.0, 1.4, 4
 #: Part of what a tile may have that is made between two depths, at most.
 _SLAB = 0.06
 #: Part of what tiles have on average that each has besides.
@@ -120,6 +118,7 @@ class Drawing:
     covered: Floats  # (columns,): pixels in each column that the loop found covered
     facet: float  # side of facets that are seen, pixels
     hidden: float = 1.0  # sides of facets over those that are asked for: the larger, the fewer for what is not seen
+    finest: float = 1.0  # sides over those at which a tile may draw that has room for more
     form: FacetConverter | None = None  # what becomes of facets where they are made; without, they stay what they are
     most: float = np.inf  # polygons and facets that there may be, should what is expected be wrong
     shadow: float = 0.0  # pixels down to which shadows of what is not seen are refined; 0 leaves them coarse
@@ -250,19 +249,17 @@ def _tiles(given: Drawing) -> tuple[list[_Item], list[Arrays], list[Shown]]:
 def _drawn_tile(given: Drawing, item: _Item) -> list[Block | Parts | Shown]:
     """All that is drawn of one tile, or of parts that are out of view."""
     number, columns, parts, share = item
-    if columns is None:
-        tile = _Tile(given, columns)
-        # Parts out of view, a share of all of them.
-        pools = list(map(tile.frontier.pool, tile.given.kinds, parts))
-        tile._draw_outside(pools, share, _UNSEEN * share * tile.given.most)
-        return tile.made(number)
-    times = 1.0
+    most = share * given.most
+    expected, known = _FULL * most, None
     for _ in range(_TRIES):
         tile = _Tile(given, columns)
-        tile.draw(parts, (columns[1] - columns[0]) / tile.coverage.width, share * given.most, times)
-        if max(tile.uneven, tile.over) <= 1.0:
+        if columns is None:  # parts out of view, a share of all of them
+            tile._draw_outside(list(map(tile.frontier.pool, given.kinds, parts)), share, _UNSEEN * most)
+        else:
+            tile.draw(parts, (columns[1] - columns[0]) / tile.coverage.width, most, expected, known)
+        if tile.again is None:
             break
-        times *= max((tile.coarser / times) ** _MEAN, max(tile.uneven, tile.over) ** _AGAIN)
+        expected, known = tile.asked, tile.again
     return tile.made(number)
 
 
@@ -275,10 +272,10 @@ class _Tile(Canvas):
         super().__init__(Coverage(given.camera, around or (0, 1)))
         self.given, self.frontier = given, Frontier(given.kinds, self.coverage, given.facet)
         self._facets: dict[tuple[Whose, bool], list[Primitive]] = {}
+        self._left = 0.5 / given.hidden**2  # part of hidden facets that stay where nothing near can stand for them
         self._drawn = 0.0  # those of what is seen
-        self._asked = 0.0  # polygons and facets that there would be with sides as they are asked for
-        #: Largest sides of what is seen, in `UNEVEN` of those that the tile began with; what was made, in what may be.
-        self.uneven = self.over = 0.0
+        self.asked = 0.0  # polygons and facets that there would be of what is seen, with the sides of the drawing
+        self.again: bool | None = None  # whether what it asked for is known now, where it is to be drawn again
 
     def made(self, number: int) -> list[Block | Parts | Shown]:
         """Meshes by kind, facets by whose they are, and what is drawn as it is; the tile lets go of each."""
@@ -297,41 +294,53 @@ class _Tile(Canvas):
 
     @property
     def coarser(self) -> float:
-        """Sides of what is seen over those of the drawing, root mean square."""
-        return float(np.sqrt(max(self._asked / max(self._drawn, 1.0), 1.0)))
+        """Sides of what is seen over those of the drawing, on average."""
+        return float(self.asked / max(self._drawn, 1.0)) ** (1.0 / FEWER) if self._drawn else 1.0
 
-    def draw(self, parts: Sequence[Arrays], share: float, most: float, larger: float = 1.0) -> None:
+    def draw(self, parts: Sequence[Arrays], share: float, most: float, expected: float, known: bool | None) -> None:
         """All parts of a tile, a share of the image, with no more than so many polygons and facets.
 
-        Sides are so many times as large as those of the drawing from the beginning.
+        So many are expected to be asked for, or known. Where they turn out to be far fewer, it stops once.
         """
-        given, frontier = self.given, self.frontier
+        given, frontier, room, least = self.given, self.frontier, _FULL * most, 0.0
         if len(given.occluders):
             self.add_shown(given.occluders)
         for slabs in frontier.slabs(parts, _SLAB * most):
-            coarser, before = self._coarser(most), self.number
-            self.uneven, times = max(self.uneven, coarser / UNEVEN), larger * coarser
+            follow, before = self._following(expected, bool(known)) if np.isfinite(most) else 0.0, self.number
+            times = (follow / max(room - before, 1.0)) ** (1.0 / FEWER)
+            least, times = least or times, max(min(times, UNEVEN * (least or times)), given.finest)
+            if known is None and before and _LARGER * times < 1.0:
+                self.asked, self.again = self.asked + follow, False
+                return
             frontier.facet, frontier.kinds = times * given.facet, [kind.coarser(times) for kind in given.kinds]
             for number, (kind, slab) in enumerate(zip(frontier.kinds, slabs, strict=True)):
-                if self.number > _FULL * most:
+                if self.number > room:
+                    self.again = self.again or bool(len(slab)) or None
                     frontier.hidden[number].append(slab)
-                    self._asked += float(slab.count.sum())  # the sides that are told are those of all that is seen
+                    self.asked += float(slab.count.sum())  # the sides that are told are those of all that is seen
                 elif len(slab):
                     side = kind.larger * frontier.facet * given.camera.extent_around(slab.center)
                     kind.draw(self, slab, side, frontier.shown)
             self._cover()
-            self._asked += times**2 * (self.number - before)
+            self.asked += times**FEWER * (self.number - before)
         self._drawn = self.number
+        if self.coarser > _LARGER * max((self.asked / room) ** (1.0 / FEWER), given.finest) and not known:
+            self.again = True
         self._draw_hidden(list(map(Waiting.concatenate, frontier.hidden)), self._few(HIDDEN_A_PIXEL, share, most))
         # What is outside of a tile's own image was part of something inside: it lies near the border.
         self._draw_outside(list(map(Waiting.concatenate, frontier.outside)), share, most)
-        self.over = self.number / most
         self._leave_out(self.number - most)
 
-    def _coarser(self, most: float) -> float:
-        """Sides over those that are asked for: what is left of so many has to do for all that follows."""
-        left = max(1.0 - self.number / (_FULL * most), _LEAST_LEFT)
-        return float(np.sqrt(max((1.0 - _SPARE) / left, 1.0)))
+    def _following(self, expected: float, known: bool) -> float:
+        """Polygons and facets that are still to be drawn, with the sides of the drawing.
+
+        Those that were drawn before, and the pixels that they left open, tell how many are needed for each layer.
+        """
+        if known:
+            return max(expected - self.asked, _EXPECTED / _LAYERS * expected)
+        layers = self.frontier.layers()
+        each = (self.asked + _EXPECTED * expected) / (layers + _EXPECTED * _LAYERS)
+        return each * max(_LAYERS - layers, 1.0)
 
     def _leave_out(self, number: float) -> None:
         """Leave out so many things, should there be more than allowed.
@@ -395,20 +404,12 @@ class _Tile(Canvas):
             self._merge(joined([facets for facets, _ in every]), np.concatenate([n for _, n in every]), whose)
 
     def _few(self, a_pixel: float, share: float, most: float) -> float:
-        """Facets that nobody sees, for each pixel of a share of the image, of the few that are left of so many.
-
-        Fewer where they are to be larger.
-        """
+        """Facets that nobody sees, for each pixel of a share of the image, of what is left of so many."""
         camera = self.given.camera
         number = share * max(a_pixel * camera.width * camera.height, NEVER_TOO_MANY) / self.given.hidden**2
         return min(number, max(0.5 * (most - self.number), 0.0))
 
     # -- what is not seen -----------------------------------------------------------------------------------------
-
-    @property
-    def _left(self) -> float:
-        """Part of hidden facets that are kept as they are, at most, where nothing near can stand for them."""
-        return 0.5 / self.given.hidden**2
 
     def _merge(self, facets: Facets, number: Floats, whose: Whose) -> None:
         """Few large facets for many that are hidden, by a random number (n,) of each.

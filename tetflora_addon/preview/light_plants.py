@@ -124,22 +124,10 @@ def _crowns(
     wood: Floats,
     reach: Floats | float = 1.0,
 ) -> tuple[Floats32, Floats32]:
-    """Corners (v, 3) of crowns and trunks, and their colors as a screen shows them.
+    """Corners (v, 3) of crowns and trunks of n plants, and their colors as a screen shows them.
 
-    Parameters
-    ----------
-    feet, frame : (n, 3), (n, 3, 3) float
-        Where plants stand, and the axes of their trunks.
-    heights : (n, 2) float
-        Of the lowest and the highest leaves, meters.
-    widths : (n, 2) float
-        Radii of the two rings, meters.
-    foot : (n,) float
-        Radius of the trunk, meters.
-    leaves, wood : (n, 3) float
-        Linear RGB.
-    reach : (n, `SIDES`) float
-        Factors on the radii to all sides.
+    Meters: feet (n, 3), axes of trunks (n, 3, 3), heights of the lowest and highest leaves and radii of two rings
+    (n, 2), radii of trunks (n,), and factors on radii to all sides (n, `SIDES`). Linear RGB (n, 3) of leaves and wood.
     """
     # Of single precision, as screens need no more: seasons go by while one looks on.
     local = np.zeros((len(feet), len(_NORMALS), 3), np.float32)

@@ -265,7 +265,7 @@ def drawn_with(most: int | None = None) -> tuple:
     flora, _, camera, result = wood()
     settings = RefinementSettings() if most is None else RefinementSettings(max_polygons=most)
     detail = fit_to_budget(result, camera, settings)
-    options = {"hidden": detail.coarser, "most": detail.most}
+    options = {"hidden": detail.coarser, "most": detail.most, "finest": detail.finest}
     return support.drawn(flora, result, detail.camera, detail.facet, detail.leaf_limit, **options)
 
 
@@ -314,10 +314,10 @@ def test_a_tile_that_needs_more_than_it_has_is_evenly_coarser(times: float) -> N
     most = (sum(block.buffers.polygons for block in blocks) + len(facets)) / times
     pictures = drawn_wood(), support.drawn(flora, result, camera, 1.2, 0.6, most=most)
     whole, limited = (np.isfinite(coverage_of(*picture, camera).depth).mean() for picture in pictures)
-    assert limited == pytest.approx(whole, rel=0.01)
+    assert 0.99 * whole < limited < 1.02 * whole
     _, facets, seen = pictures[1]
     sides = pixels_of(facets, camera)[seen]
-    assert sides.max() < 1.2 * subject.UNEVEN * np.median(sides)
+    assert sides.max() < 2.0 * np.median(sides)
 
 
 def test_sides_that_are_told_are_those_that_are_drawn() -> None:

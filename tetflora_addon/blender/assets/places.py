@@ -71,11 +71,6 @@ def attributes_of(material: bpy.types.Material | None) -> Iterator[str]:
                 waiting.append(node.node_tree)
 
 
-def _material(material: bpy.types.Material | None) -> object:
-    """What a material looks like, as numbers, texts and sequences of these."""
-    return material and (tuple(material.diffuse_color), (tree := tree_in_use(material)) and _tree(tree))
-
-
 def _tree(tree: bpy.types.NodeTree) -> object:
     number = {node.as_pointer(): i for i, node in enumerate(tree.nodes)}
     nodes = [
@@ -312,7 +307,9 @@ def digest_of(target: Target, depsgraph: bpy.types.Depsgraph, parts: list[AssetP
 
 
 def _add_mesh(content: "hashlib._Hash", mesh: bpy.types.Mesh, slots: Slots) -> None:
-    content.update(repr([_material(material) for material in slots]).encode())
+    content.update(
+        repr([m and (tuple(m.diffuse_color), (tree := tree_in_use(m)) and _tree(tree)) for m in slots]).encode()
+    )
     content.update(f"{len(mesh.vertices)} {len(mesh.polygons)} {len(mesh.loops)}".encode())
     content.update(read(mesh, "position"))
     content.update(read(mesh, ".corner_vert"))

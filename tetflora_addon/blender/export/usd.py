@@ -359,7 +359,10 @@ def forest_steps(order: Import, mix: Mapping[str, float]) -> Steps:
         for name, data, points in read_parts(order.path):
             if data and int(data.get("format", 0)) > FORMAT:
                 raise SceneError(f"{order.what}was written by a newer TetFlora; update the extension")
-            points, kinds = (points, _kinds(data)) if data else _completed(points, mix)
+            if data:  # species that it counts through, each with the name of the object of its form
+                kinds = list(zip(map(str, data["species"]), map(str, data["forms"]), strict=True))
+            else:
+                points, kinds = _completed(points, mix)
             made.append(_field(name, data, points, kinds))
             missing += [form for _, form in kinds if form and bpy.data.objects.get(form) is None]
             number += len(points["position"][1])
@@ -376,11 +379,6 @@ def forest_steps(order: Import, mix: Mapping[str, float]) -> Steps:
     if missing:
         told.append(f"without their forms, which this file has no objects for: {listed(sorted(set(missing)))}")
     return Imported(made[0], told, bool(missing))
-
-
-def _kinds(data: Mapping) -> list[tuple[str, str]]:
-    """Species that an exported part counts through, each with the name of the object of its form."""
-    return list(zip(map(str, data["species"]), map(str, data["forms"]), strict=True))
 
 
 def _completed(points: PointAttributes, mix: Mapping[str, float]) -> tuple[PointAttributes, list[tuple[str, str]]]:

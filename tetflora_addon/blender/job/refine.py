@@ -541,7 +541,7 @@ def _refined(run: _Run, disc: float) -> Job[EmissionInput]:
     becomes = None if run.baking is not None else form.form(camera, disc, sun_of(refinement.lights))
     view = detail.camera
     how = Transition(flora, view, detail.leaf_limit, detail.tolerance), facet_weights(flora), clusters, given.occluders
-    options = {"facet": detail.facet, "hidden": detail.coarser, "most": detail.most}
+    options = {"facet": detail.facet, "hidden": detail.coarser, "most": detail.most, "finest": detail.finest}
     with_all = drawing(flora, refinement, *how, form=becomes, shadow=run.settings.shadow_cutoff, **options)
     if run.whole is not None:  # as many as that is expected to have
         pixels = run.whole[0].width * run.whole[0].height / (camera.width * camera.height)
