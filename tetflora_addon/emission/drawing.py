@@ -437,8 +437,10 @@ class _Tile(Canvas):
         self._keep(replace(facets, side=facets.side * np.sqrt(times[kept])), False, whose)
 
     def _hidden(self, facets: Facets) -> Mask:
-        """Facets (n,) behind full pixels."""
-        return self.coverage.hidden(self.coverage.of_corners(triangle_corners(facets))[0])
+        """Facets (n,) behind full pixels, also as spheres: those reach nearer, and farther to the sides."""
+        cover, spheres = self.coverage, (facets.center.astype(np.float64), facets.side / np.sqrt(np.pi))
+        hidden = cover.hidden(cover.of_corners(triangle_corners(facets))[0])
+        return hidden & cover.hidden(cover.of_spheres(*spheres))
 
     def _draw_hidden(self, pools: list[Waiting], most: float) -> None:
         """Hidden parts: facets that grow with their depth in the shade, as many as are allowed."""

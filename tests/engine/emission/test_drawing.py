@@ -101,6 +101,18 @@ def test_what_is_hidden_never_shows() -> None:
     assert (facets.side[~seen][~cover.hidden(prints)] ** 2).sum() < 0.02 * (facets.side[~seen] ** 2).sum()
 
 
+@pytest.mark.parametrize("times", [1.0, 3.0])
+def test_what_is_hidden_never_shows_as_a_sphere(times: float) -> None:
+    """Spheres reach nearer to the eye than the facets for which they are drawn; coarse ones by more."""
+    flora, _, camera, result = wood()
+    blocks, facets, seen = support.drawn(flora, result, camera, 1.2 * times, 0.6 * times, hidden=times)
+    cover, center = coverage_of(blocks, facets, seen, camera), facets.center[~seen].astype(float)
+    side = facets.side[~seen]
+    inside = camera.distance_to_view(center) <= 0.0
+    shows = inside & ~cover.hidden(cover.of_spheres(center, side / np.sqrt(np.pi)))
+    assert (side[shows] ** 2).sum() < 0.02 * (side[inside] ** 2).sum()
+
+
 @pytest.mark.parametrize("lens", [0.0, 0.1, 0.4])
 def test_no_facet_of_what_is_outside_is_in_the_image(lens: float) -> None:
     """A plant of which a little is in the corner of the image: what is large lies beyond it and its blur as a whole.
