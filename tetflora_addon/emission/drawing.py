@@ -74,7 +74,7 @@ _FULL = 0.85
 _LAYERS, _EXPECTED = 5.0, 0.5
 #: Largest sides in a tile over those that it began with: shards would show among fine leaves. A tile that is not
 #: complete so, or whose sides are so many times what they may be, is drawn again, so often at most.
-UNEVEN, _LARGER, _TRIES = 3.0, 1.4, 4
+UNEVEN, _LARGER, _TRIES = 2.0, 1.4, 4
 #: Part of what a tile may have that is made between two depths, at most.
 _SLAB = 0.06
 #: Part of what tiles have on average that each has besides.
