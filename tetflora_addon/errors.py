@@ -50,5 +50,9 @@ class SpeciesError(TetFloraError):
     """A species file or leaf model is broken or unknown."""
 
 
+class UnansweredError(TetFloraError):
+    """Blender's window did not answer what another thread asked for."""
+
+
 class SceneError(TetFloraError):
     """The scene lacks something that refinement needs, or holds something that it cannot use."""

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What another thread asks for is done in the main thread, or by itself where that does not answer."""
+"""What another thread asks for is done in the main thread, or refused where that does not answer."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ import bpy
 import pytest
 
 from tetflora_addon.blender import main_thread, runtime
+from tetflora_addon.errors import UnansweredError
 
 
 @pytest.fixture
@@ -27,6 +28,7 @@ def window(monkeypatch):
     timers = SimpleNamespace(register=register, is_registered=lambda _: False)
     app = SimpleNamespace(background=False, timers=timers)
     data = SimpleNamespace(window_managers=[manager], scenes=())
+    monkeypatch.setattr(main_thread, "_away", False)  # or a file was loaded without any window, which never looks
     monkeypatch.setattr(main_thread, "bpy", SimpleNamespace(app=app, data=data))
     monkeypatch.setattr(bpy.app.timers, "register", register)
     yield SimpleNamespace(manager=manager, timers=asked)
@@ -39,23 +41,28 @@ def elsewhere(function, *given) -> object:
         return pool.submit(function, *given).result(5.0)
 
 
+def wait_until(true) -> None:
+    """Wait for something that another thread does."""
+    end = time.monotonic() + 5.0
+    while not true() and time.monotonic() < end:
+        time.sleep(0.001)
+
+
 def asked(function) -> Future:
     """Ask from another thread."""
     with ThreadPoolExecutor(1) as pool:
-        future = pool.submit(main_thread._handed_over, function)
-        end = time.monotonic() + 5.0
-        while not main_thread._asked and time.monotonic() < end:
-            time.sleep(0.001)
+        future = pool.submit(main_thread.in_main_thread, function)
+        wait_until(lambda: main_thread._asked)
         main_thread.make_changes()
         future.exception(5.0)
     return future
 
 
-def test_the_main_thread_makes_the_change_and_the_asker_gets_its_result() -> None:
+def test_the_main_thread_makes_the_change_and_the_asker_gets_its_result(window) -> None:
     assert asked(threading.current_thread).result() is threading.main_thread()
 
 
-def test_an_error_is_raised_where_it_was_asked_for() -> None:
+def test_an_error_is_raised_where_it_was_asked_for(window) -> None:
     def fail() -> None:
         raise ValueError("no such scene")
 
@@ -67,14 +74,33 @@ def test_without_a_window_it_is_made_at_once() -> None:
     assert main_thread.in_main_thread(threading.current_thread) is threading.main_thread()
 
 
-def test_where_the_main_thread_waits_itself_the_asker_makes_the_change_once(monkeypatch) -> None:
+def test_while_the_main_thread_is_busy_nobody_makes_the_change_and_what_restores_is_made_afterward(
+    window, monkeypatch
+) -> None:
     monkeypatch.setattr(main_thread, "_PATIENCE", 0.01)
+    calls, after = [], []
+    with pytest.raises(UnansweredError, match="did not answer"):
+        elsewhere(main_thread.in_main_thread, lambda: calls.append(1))
+    monkeypatch.setattr(main_thread, "_PATIENCE", 30.0)  # whoever waited once for nothing does not wait again
+    elsewhere(main_thread.restore_in_main_thread, lambda: after.append(threading.current_thread()))
+    main_thread.make_changes()
+    assert (calls, after) == ([], [threading.main_thread()])
+    assert asked(int).result() == 0
+
+
+def test_what_waits_while_a_file_is_opened_or_blender_quits_is_refused_at_once(window) -> None:
     calls = []
     with ThreadPoolExecutor(1) as pool:
-        pool.submit(main_thread._handed_over, lambda: calls.append(threading.current_thread())).result(5.0)
+        future = pool.submit(main_thread.in_main_thread, lambda: calls.append(1))
+        wait_until(lambda: main_thread._asked)
+        main_thread.leave()
+        assert isinstance(future.exception(5.0), UnansweredError)
+        assert isinstance(pool.submit(main_thread.in_main_thread, int).exception(5.0), UnansweredError)
+        pool.submit(main_thread.restore_in_main_thread, lambda: calls.append(1)).result(5.0)
+    main_thread.leave()  # after the file was read
     main_thread.make_changes()
-    assert len(calls) == 1
-    assert calls[0] is not threading.main_thread()
+    assert not calls
+    assert asked(int).result() == 0
 
 
 def test_one_timer_looks_for_ever_often_after_a_change_and_seldom_else(window) -> None:

@@ -26,6 +26,11 @@ def eevee_engine() -> str:
     )
 
 
+def handlers(name: str) -> list:
+    """Functions that Blender calls; of ``exit_pre``, which 4.5 lacks, a list that nobody reads."""
+    return getattr(bpy.app.handlers, name, [])
+
+
 def stored_properties(owner: bpy.types.ID) -> Any | None:
     """Custom properties in which Blender keeps a datablock's groups, whatever add-ons declare now; None without any."""
     return owner.bl_system_properties_get() if hasattr(owner, "bl_system_properties_get") else owner

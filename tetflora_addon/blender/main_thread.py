@@ -19,14 +19,16 @@ import threading
 import traceback
 from collections import deque
 from collections.abc import Callable
-from concurrent.futures import Future, wait
+from concurrent.futures import CancelledError, Future, wait
 from typing import TypeVar
 
 import bpy
 
-#: Seconds after which the caller makes the change itself: the main thread then waits for the render, to quit or to
-#: open a file, and draws nothing.
-_PATIENCE = 3.0
+from ..errors import UnansweredError
+
+#: Seconds after which the caller gives up: the main thread then waits for the render itself, as *Undo* does. One that
+#: is only busy, on a first redraw for instance, must not be taken for it: what the caller then changed would crash it.
+_PATIENCE = 30.0
 #: Seconds between two looks, and between those of a while without any change; how many looks such a while has.
 _LOOK, _IDLE, _LOOKS = 0.005, 0.05, 400
 
@@ -34,15 +36,15 @@ _Result = TypeVar("_Result")
 
 
 class _Change(Future[_Result]):
-    """A function that is called once, by whoever comes first; whether anybody waits for its result."""
+    """A function for the main thread; whether anybody waits for its result."""
 
     def __init__(self, function: Callable[[], _Result], waits: bool = True) -> None:
         super().__init__()
-        self._function, self._waits, self._mine = function, waits, threading.Lock()
+        self._function, self._waits = function, waits
 
     def make(self) -> None:
-        """Call the function unless somebody has begun to."""
-        if not self._mine.acquire(blocking=False):
+        """Call the function unless nobody wants it any more."""
+        if not self.set_running_or_notify_cancel():
             return
         try:
             made = self._function()
@@ -56,6 +58,9 @@ class _Change(Future[_Result]):
 
 _asked: deque[_Change] = deque()
 _idle = _LOOKS
+_NO_ANSWER = "Blender's window did not answer; render again, or with blender -b"
+#: Whether the main thread does not look any more, as far as is known.
+_away = False
 
 
 def sync_view_layers() -> None:
@@ -74,8 +79,32 @@ def in_main_thread(function: Callable[[], _Result] = sync_view_layers) -> _Resul
     ----------
     function : callable
         By default `sync_view_layers`: what the main thread was doing is done then.
+
+    Raises
+    ------
+    UnansweredError
+        If the main thread does not look; the function is not called.
     """
-    return function() if bpy.app.background or on_main_thread() else _handed_over(function)
+    global _away
+    if bpy.app.background or on_main_thread():
+        return function()
+    _asked.append(change := _Change(function))
+    if _away or not wait([change], _PATIENCE).done:
+        _away = change.cancel() or _away  # not if it is being made
+    try:
+        return change.result()
+    except CancelledError:
+        raise UnansweredError(_NO_ANSWER) from None
+    finally:
+        del change  # an error would hold itself by its traceback
+
+
+def restore_in_main_thread(function: Callable[[], object]) -> None:
+    """Call a function that undoes earlier ones like `in_main_thread`, or as soon as the main thread looks again."""
+    try:
+        in_main_thread(function)
+    except UnansweredError:
+        later(function)
 
 
 def window_draws() -> bool:
@@ -97,24 +126,23 @@ def later(function: Callable[[], object]) -> None:
         _asked.append(_Change(function, False))
 
 
-def _handed_over(function: Callable[[], _Result]) -> _Result:
-    change = _Change(function)
-    _asked.append(change)
-    if not wait([change], _PATIENCE).done:
-        change.make()
-    try:
-        return change.result()
-    finally:
-        del change  # an error would hold itself by its traceback
-
-
 def make_changes() -> float:
     """Make what other threads have asked for; seconds until the next look."""
-    global _idle
+    global _idle, _away
+    _away = False
     _idle = 0 if _asked else min(_idle + 1, _LOOKS)
     while _asked:
         _asked.popleft().make()
     return _LOOK if _idle < _LOOKS else _IDLE
+
+
+def leave(*_: object) -> None:
+    """Refuse what is asked for until the next look: a render is to end first, or another file was opened."""
+    global _away
+    _away = True
+    while _asked:
+        if (change := _asked.popleft()).set_running_or_notify_cancel():
+            change.set_exception(UnansweredError(_NO_ANSWER))
 
 
 def register() -> None:

@@ -23,8 +23,9 @@ from bpy.app.handlers import persistent
 
 from ..errors import SceneError, readable
 from ..processes import pool
+from . import compat
 from .declare import once
-from .main_thread import in_main_thread, later, on_main_thread
+from .main_thread import in_main_thread, later, leave, on_main_thread
 
 _Datablock = TypeVar("_Datablock", bound=bpy.types.ID)
 #: Letters of a line in a popup.
@@ -80,13 +81,13 @@ class Handlers:
     def register(self) -> None:
         """Add them in order."""
         for name, function in self._functions:
-            getattr(bpy.app.handlers, name).append(function)
+            compat.handlers(name).append(function)
 
     def unregister(self) -> None:
         """Remove those that are still there."""
         for name, function in self._functions:
-            if function in getattr(bpy.app.handlers, name):
-                getattr(bpy.app.handlers, name).remove(function)
+            if function in (there := compat.handlers(name)):
+                there.remove(function)
 
 
 class Listeners(list):
@@ -400,7 +401,9 @@ def stop_jobs(reason: str) -> None:
 _STOPPING = Handlers(
     undo_pre=lambda *_: stop_jobs("Undo changed what it works on"),
     redo_pre=lambda *_: stop_jobs("Redo changed what it works on"),
-    load_pre=lambda *_: stop_jobs("another file was opened"),
+    load_pre=(lambda *_: stop_jobs("another file was opened"), leave),
+    load_post=leave,
+    exit_pre=leave,
     render_init=lambda *_: in_main_thread(partial(stop_jobs, "a render began")),
 )
 unregister = _STOPPING.unregister

@@ -169,8 +169,10 @@ def orientation_of(
             if leaf[i, i] > 0:
                 own = _own_leaves(rows, branches, lines, turn[i], place if beyond else None)
                 leaves = own.mixed(leaves, leaf[i, i] / leaf_area[i])
-                straight = _own_leaves(rows, branches, _straight(branches), turn[i], place)
-                out.own_leaves[i, node] = straight.fitted(branches, basis)
+                knots = np.stack([branches.position, branches.position + branches.frame[:, :, 2]], axis=1)
+                straight = Axes(knots, branches.frame[:, None], np.ones(len(branches), np.int64))
+                straight_leaves = _own_leaves(rows, branches, straight, turn[i], place)
+                out.own_leaves[i, node] = straight_leaves.fitted(branches, basis)
             out.leaves[i, node] = leaves.fitted(branches, basis)
         weight = stands * children.length * children.radius * wood_area[row]
         bark = _Sums.of(len(branches), owner, _evaluated(out.wood, row, children.frame, children.outward), weight)
@@ -272,12 +274,6 @@ def _some_children(rows: Table, branches: Branches, lines: Axes) -> tuple[Branch
         owners.append(some)
         stands.append(counts[some].astype(np.float64))
     return Branches.concatenate(grown), np.concatenate(owners), np.concatenate(stands)
-
-
-def _straight(branches: Branches) -> Axes:
-    """Center lines of branches that do not bend."""
-    knots = np.stack([branches.position, branches.position + branches.frame[:, :, 2]], axis=1)
-    return Axes(knots, branches.frame[:, None], np.ones(len(branches), np.int64))
 
 
 def _own_leaves(rows: Table, branches: Branches, lines: Axes, turn: Floats, place: float | None) -> _Sums:

@@ -80,7 +80,9 @@ class LeafDetail:
         """
         branches, camera = whole.branches, self.camera
         out = np.zeros(len(branches))
-        most = 1.0 / np.maximum(self._errors()[self.flora.rows["species"][branches.row]], 1e-300)
+        forms = ([f for kind in range(len(LEAF_KINDS)) for f in own[kind]] for own in self.flora.forms)
+        errors = np.array([max((coarse_error(f) for f in own), default=0.0) for own in forms])
+        most = 1.0 / np.maximum(errors[self.flora.rows["species"][branches.row]], 1e-300)
         size = self.flora.rows["leaf_size"][branches.row].sum(axis=1) * branches.scale
         for factor in ("leaf_size_tip", "leaf_size_young"):
             size = size * np.maximum(self.flora.rows[factor][branches.row], 1.0)
@@ -97,11 +99,6 @@ class LeafDetail:
         nearest = self._nearest(extent, reach)
         out[near] = size[near] / np.maximum(nearest, extent / NEARER) / self.tolerance
         return out
-
-    def _errors(self) -> Floats:
-        """Largest error (species,) of a species' models."""
-        forms = ([f for kind in range(len(LEAF_KINDS)) for f in own[kind]] for own in self.flora.forms)
-        return np.array([max((coarse_error(f) for f in own), default=0.0) for own in forms])
 
     def _extent(self, points: Floats, reach: Floats | float) -> Floats:
         """Meters (n,) that a pixel spans at what reaches so far around points (n, 3), in view or not."""

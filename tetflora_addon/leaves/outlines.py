@@ -126,9 +126,6 @@ class Blade:
         """Heights (n,) of unlobed margins; close together at both ends, where they may be round."""
         return (1.0 - np.cos(np.pi * s)) / 2.0
 
-    def _along(self, s: Floats) -> Floats:
-        return s if self.palmate else self._height(s)
-
     def envelope(self, y: Floats) -> Floats:
         """Half widths (n,) of the blade without lobes and teeth at heights y (n,)."""
         (p, q), (r, t) = BASES[self.base], APEXES[self.apex]
@@ -213,7 +210,7 @@ class Blade:
         """Heights (n,) of teeth over the mean margin, lower toward both ends."""
         if not self.teeth:
             return np.zeros_like(s)
-        along = self._along(s)
+        along = s if self.palmate else self._height(s)
         phase = self.teeth * along
         if self.tooth in ("serrate", "doubly serrate"):
             height = _saw(phase, self._rise) - 0.5

@@ -338,7 +338,8 @@ def refine(
         kind.update(tree, divided, np.where(divided, np.inf, 0.0))
     clock.lap("update")
     shadowed = bool(lights) and settings.shadow_cutoff > 0.0
-    ground = seen_ground(camera, occluders, _height(seeds, polygons, placed)) if shadowed else None
+    every = np.concatenate([seeds.position, placed.instances.position, polygons.center])
+    ground = seen_ground(camera, occluders, float(np.median(every[:, 2]))) if shadowed else None
     buffers = Buffers(camera, settings.visibility_resolution, occluders)
     # Generations count from the root's own pieces. Passes do not count: a late one may divide what is still coarse.
     deepest = tree.levels - 1 + settings.max_levels
@@ -397,12 +398,6 @@ def refine(
         kept = cells.take(np.flatnonzero(~changed[cells.nodes]))
         cells, buffer = _drawn(tree, buffers, buffer, kept, *_filled(tree, shared, cell_polygons, changed))
         clock.lap("visibility")
-
-
-def _height(seeds: Seeds, polygons: Polygons, placed: PlacedAssets) -> float:
-    """Median height of what there is, meters."""
-    every = np.concatenate([seeds.position, placed.instances.position, polygons.center])
-    return float(np.median(every[:, 2]))
 
 
 def _bounds(flora: Flora, plants: SharedPlants, assets: SharedAssets, polygons: Polygons) -> Floats:

@@ -103,7 +103,9 @@ def with_surfaces(
         for part, surface in list(surfaces.items()):
             if surface.cut:
                 levels = tuple(_uncut(level, part, surface.kept) for level in levels)
-                surfaces[part + _FAR] = _opaque(surface)
+                opaque = {name: file for name, file in surface.textures.items() if name not in ("opacity", "card")}
+                far = replace(surface, name=surface.name + _FAR, cut=0.0, problems=(), textures=opaque)
+                surfaces[part + _FAR] = far
         made.append(replace(variant, levels=levels, surfaces=surfaces))
     return tuple(made)
 
@@ -114,12 +116,6 @@ def _uncut(level: PlantLevel, part: str, kept: float) -> PlantLevel:
         return level
     made = ((kind + _FAR, with_area(mesh, kept)) if kind == part else (kind, mesh) for kind, mesh in level.parts)
     return replace(level, parts=tuple(made))
-
-
-def _opaque(surface: BakedSurface) -> BakedSurface:
-    """The same without alpha."""
-    left = {name: file for name, file in surface.textures.items() if name not in ("opacity", "card")}
-    return replace(surface, name=surface.name + _FAR, cut=0.0, problems=(), textures=left)
 
 
 def _even(variants: Sequence[Variant]) -> Iterator[Variant]:

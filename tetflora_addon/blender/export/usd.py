@@ -115,7 +115,8 @@ def _write_part(pxr: SimpleNamespace, stage: object, path: str, part: ForestPart
     known = {"position": ('FLOAT_VECTOR', part.position), **{name: columns[name] for name in ("seed", "species")}}
     stored: dict[str, str] = {}
     for name, (kind, values) in part.points.items():
-        same = name in known and known[name][0] == kind and _equal(known[name][1], values)
+        there, one = known.get(name, ("", values))
+        same = (there, one.shape) == (kind, values.shape) and one.tobytes() == values.astype(one.dtype).tobytes()
         stored[name] = kind if same else f"{kind} {PREFIX}{name}"
         if not same:
             _add(pxr, primvars, PREFIX + name, kind, values)
@@ -151,10 +152,6 @@ def _columns(part: ForestPart) -> dict[str, tuple[str, NDArray]]:
 def halves(seed: Integers) -> NDArray[np.int32]:
     """Seeds (n,) of 64 bits as two numbers each, (n, 2)."""
     return np.ascontiguousarray(seed, np.int64).view(np.int32).reshape(-1, 2)
-
-
-def _equal(one: NDArray, other: NDArray) -> bool:
-    return one.shape == other.shape and one.tobytes() == np.ascontiguousarray(other, one.dtype).tobytes()
 
 
 def _add(pxr: SimpleNamespace, primvars: object, name: str, kind: str, values: NDArray) -> None:
@@ -297,18 +294,10 @@ def _own_points(pxr: SimpleNamespace, prim: object, data: dict) -> PointAttribut
     primvars, found = pxr.UsdGeom.PrimvarsAPI(prim), {}
     for name, told in dict(data["attributes"]).items():
         kind, _, other = str(told).partition(" ")
-        if name == "position" and not other:
-            values = prim.GetAttribute("positions").Get()
-        else:
-            values = primvars.GetPrimvar(other or name).Get()
-        found[name] = kind, _numbers(kind, values)
+        place = name == "position" and not other
+        values = np.array((prim.GetAttribute("positions") if place else primvars.GetPrimvar(other or name)).Get())
+        found[name] = kind, np.ascontiguousarray(np.roll(values, 1, axis=1)) if kind == 'QUATERNION' else values
     return found
-
-
-def _numbers(kind: str, values: object) -> NDArray:
-    """Values of USD as those of an attribute."""
-    made = np.array(values)
-    return np.ascontiguousarray(np.roll(made, 1, axis=1)) if kind == 'QUATERNION' else made
 
 
 def _other_points(pxr: SimpleNamespace, prim: object) -> PointAttributes:

@@ -40,7 +40,7 @@ from ...refinement.settings import FIRST_LOOK, RefinementSettings
 from ...species.kinds import Kind
 from ..assets.places import Places, Target
 from ..compat import drawn_disc
-from ..main_thread import in_main_thread
+from ..main_thread import in_main_thread, restore_in_main_thread
 from ..materials.materials import baked_material
 from ..results.collection import Results
 from ..results.hiding import hide_originals, originals_shown, remove_results
@@ -431,7 +431,7 @@ def _refine_steps(run: _Run, first_look: bool) -> Job[Statistics]:
         clock.lap("emit")
         run.data.check()
     except BaseException:  # an error, Esc (GeneratorExit) or Ctrl+C
-        in_main_thread(results.discard)
+        restore_in_main_thread(results.discard)
         raise
     in_main_thread(partial(_replace, run))
     memory.give_back()
@@ -454,7 +454,7 @@ def _first_look(run: _Run) -> Job[Results]:
         yield from mapped(_write_refined(first), lambda p: Progress(0.02 + 0.03 * p.fraction, "First look", p.waiting))
         run.data.check()
     except BaseException:
-        in_main_thread(results.discard)
+        restore_in_main_thread(results.discard)
         raise
     in_main_thread(partial(_replace, first))
     run.tiles = first.tiles

@@ -21,7 +21,7 @@ from functools import partial
 import bpy
 
 from ...errors import TetFloraError
-from ..main_thread import in_main_thread, window_draws
+from ..main_thread import in_main_thread, restore_in_main_thread, window_draws
 from ..results import hiding
 from ..results.collection import has_results, leave_out_of_file, result_collections
 from ..results.output import KIND, adopt_materials, release_materials
@@ -105,7 +105,7 @@ def on_render_pre(scene: bpy.types.Scene, _depsgraph: object = None) -> None:
         remember(text, error)
     finally:
         if not made:
-            in_main_thread(partial(_take_back, scene))
+            restore_in_main_thread(partial(_take_back, scene))
             if has_results(scene):
                 _rendering.raised.setdefault(scene.session_uid, {}).update(raise_settings(scene))
         _rendering.busy = False
@@ -123,7 +123,7 @@ def on_render_end(scene: bpy.types.Scene, _depsgraph: object = None) -> None:
     try:
         for other in bpy.data.scenes:
             if other.session_uid in rendered and other.library is None:
-                in_main_thread(partial(_take_back, other))
+                restore_in_main_thread(partial(_take_back, other))
     finally:
         _rendering.busy, _rendering.outer = False, 0
         _rendering.scenes.clear()

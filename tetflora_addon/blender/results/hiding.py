@@ -18,7 +18,7 @@ from contextlib import contextmanager
 import bpy
 
 from ...errors import SceneError
-from ..main_thread import in_main_thread
+from ..main_thread import in_main_thread, restore_in_main_thread
 from ..materials.nodes import MADE, is_ours, is_own, tag, untag
 from ..scene.motion import curves_of
 from ..scene.objects import may_take_part
@@ -482,4 +482,4 @@ def originals_shown(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph | Non
             depsgraph.update()
         yield
     finally:
-        in_main_thread(restore)
+        restore_in_main_thread(restore)

@@ -119,12 +119,6 @@ def points(preview: Preview) -> gpu.types.GPUBatch:
     return made
 
 
-def _near(shapes: Shapes, eye: Floats) -> tuple[gpu.types.GPUBatch | None, Floats, float]:
-    """Those with faces as seen from a place (3,), the place, and from which height over the distance on they have."""
-    found, least = nearest(shapes, eye)
-    return plants(found), eye, least
-
-
 def _standing(crowns: CrownPoints) -> gpu.types.GPUVertBuf:
     layout = gpu.types.GPUVertFormat()
     layout.attr_add(id="pos", comp_type='F32', len=3, fetch_mode='FLOAT')
@@ -239,13 +233,14 @@ def _draw(made: gpu.types.GPUBatch | None, origin: Floats, shader: gpu.types.GPU
 
 def _draw_plants(preview: Preview) -> None:
     shapes = preview.shapes
-    made, near, eye, least = _kept(preview, "plants", (preview.made,), lambda: plants(shapes)), None, None, 0.0
+    made, near = _kept(preview, "plants", (preview.made,), lambda: plants(shapes)), None
     if shapes.crowns is not None:
         region = bpy.context.region_data
         place = region.view_matrix.inverted().translation if region.is_perspective else region.view_location
         key = preview.made, *(round(part) for part in place)  # another meter shows others
         name = f"near {bpy.context.space_data.as_pointer()}"
-        near, eye, least = _kept(preview, name, key, lambda: _near(shapes, np.array(place)))
+        found, least, eye = _kept(preview, name, key, lambda: (*nearest(shapes, np.array(place)), np.array(place)))
+        near = _kept(preview, f"{name} faces", key, lambda: plants(found))
     gpu.state.depth_test_set('LESS_EQUAL')
     gpu.state.depth_mask_set(True)
     gpu.state.face_culling_set('BACK')  # crowns and trunks are closed
