@@ -18,7 +18,7 @@ from tetflora_addon.compiled.flora import Flora, compile_species
 from tetflora_addon.emission.budget import fit_to_budget
 from tetflora_addon.emission.plants import LeafDetail, Transition, expanded_blocks
 from tetflora_addon.growth.growth import WholeBranches
-from tetflora_addon.leaves.levels import leaf_levels
+from tetflora_addon.leaves.levels import coarse_error, leaf_levels
 from tetflora_addon.refinement.settings import RefinementSettings
 from tetflora_addon.species.catalog import load_species
 from tetflora_addon.species.members import expected_polygons
@@ -119,8 +119,8 @@ def test_lengths_are_those_in_the_image() -> None:
     assert some.any()
     assert (lengths[some] >= seen[some]).all()
     assert (lengths[some] < 1.5 * seen[some]).mean() > 0.8
-    errors = LeafDetail(flora, camera)._errors()[0]
-    assert (seen[~some] * errors <= 1.0).all()
+    error = max(coarse_error(model) for models in flora.forms[0] for model in models)
+    assert (seen[~some] * error <= 1.0).all()
 
 
 def test_what_is_out_of_view_is_coarse() -> None:
