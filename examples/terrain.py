@@ -83,7 +83,7 @@ def _catmull_rom(t: NDArray) -> tuple[NDArray, ...]:
 
 
 def ground_material() -> bpy.types.Material:
-    """Meadow: greens and browns by noise."""
+    """Meadow: greens and browns by noise, down to tufts and blades of a centimeter."""
     material = bpy.data.materials.new("Meadow")
     if not material.node_tree:  # before Blender 5.0 new materials have no nodes
         material.use_nodes = True
@@ -96,11 +96,12 @@ def ground_material() -> bpy.types.Material:
     links.new(place.outputs["Object"], noise.inputs["Vector"])
     ramp = nodes.new("ShaderNodeValToRGB")
     ramp.color_ramp.elements[0].position, ramp.color_ramp.elements[1].position = 0.38, 0.66
-    ramp.color_ramp.elements[0].color = (0.075, 0.12, 0.03, 1)
-    ramp.color_ramp.elements[1].color = (0.2, 0.19, 0.085, 1)
+    ramp.color_ramp.elements[0].color = (0.085, 0.13, 0.035, 1)
+    ramp.color_ramp.elements[1].color = (0.17, 0.175, 0.07, 1)
     links.new(noise.outputs[0], ramp.inputs[0])
     tufts = nodes.new("ShaderNodeTexNoise")
-    tufts.inputs["Scale"].default_value, tufts.inputs["Detail"].default_value = 4.0, 6.0
+    for name, value in (("Scale", 4.0), ("Detail", 7.0), ("Roughness", 0.85)):
+        tufts.inputs[name].default_value = value
     links.new(place.outputs["Object"], tufts.inputs["Vector"])
     shade = nodes.new("ShaderNodeMapRange")
     shade.inputs["From Min"].default_value, shade.inputs["From Max"].default_value = 0.3, 0.7
@@ -110,8 +111,12 @@ def ground_material() -> bpy.types.Material:
     scaled.operation = 'SCALE'
     links.new(ramp.outputs["Color"], scaled.inputs[0])
     links.new(shade.outputs[0], scaled.inputs["Scale"])
+    bump = nodes.new("ShaderNodeBump")
+    bump.inputs["Distance"].default_value = 0.08
+    links.new(tufts.outputs[0], bump.inputs["Height"])
     diffuse = nodes.new("ShaderNodeBsdfDiffuse")
     links.new(scaled.outputs[0], diffuse.inputs["Color"])
+    links.new(bump.outputs[0], diffuse.inputs["Normal"])
     out = nodes.new("ShaderNodeOutputMaterial")
     links.new(diffuse.outputs[0], out.inputs["Surface"])
     return material
