@@ -13,7 +13,7 @@ from ..tetflora_addon.blender.placing.first_forest import build
 from ..tetflora_addon.blender.placing.plant_objects import add_plant, next_seed
 from ..tetflora_addon.blender.placing.populations import PlacedPlants, add_population, make_plants_steps, restored
 from ..tetflora_addon.blender.placing.properties import CREATE_AS, MOST_EMPTIES
-from ..tetflora_addon.blender.placing.rules import copy_entry
+from ..tetflora_addon.blender.placing.rules import copy_entry, free_seed
 from ..tetflora_addon.blender.scene.skeletons import SKELETON_TYPES, read_skeleton, upright_turn
 from ..tetflora_addon.blender.settings import properties_of
 from ..tetflora_addon.blender.species.catalog import NO_SPECIES, default_species, operator_items
@@ -161,7 +161,8 @@ class TETFLORA_OT_populate(ModalJob, Operator, label="Scatter", needs=(in_object
             self.by_density = False  # a script asks for so many
         for name in _SHARED:
             if not self.properties.is_property_set(name) and name != "min_distance":
-                setattr(self, name, getattr(settings, name))
+                value = getattr(settings, name)
+                setattr(self, name, free_seed(scene, value) if name == "seed" else value)
         if not self.species:
             self.species = mix_in(settings)
         weights = parse_weights(self.species)

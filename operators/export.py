@@ -27,7 +27,6 @@ class TETFLORA_OT_export_forest(
 
     browse = ExportHelper.invoke
     cancelled = "Cancelled; nothing was written"
-
     filter_glob: StringProperty(default=";".join(f"*{ending}" for ending in forest.WRITERS), options={'HIDDEN'})
     format: once.choice("Format", "What the file is for, if its name has no ending", forest.FORMATS)
     variants: once.integer(
@@ -46,7 +45,6 @@ class TETFLORA_OT_export_forest(
         "Leave out levels of detail with more polygons than this; 0 for none",
         **within(0, 1_000_000, 100_000_000),
     )
-
     bake: once.boolean(
         "Bake Materials", "Bake veins, bark and relief with Cycles; otherwise textures have colors and outlines", True
     )

@@ -88,7 +88,6 @@ class TETFLORA_OT_update_layers(ModalJob, Operator, label="Update", needs=_ACTIV
     """
 
     cancelled = "Stopped; layers that were done already keep their new plants"
-
     which: once.choice(
         "Layers",
         "Which layers to grow again",
@@ -140,7 +139,10 @@ class TETFLORA_OT_update_layers(ModalJob, Operator, label="Update", needs=_ACTIV
             name = layer.name
             try:
                 with closing(self._steps_of(scene, depsgraph, layer)) as steps:
-                    made.append((yield from part_of(steps, number / len(uids), (number + 1) / len(uids), name)))
+                    one = yield from part_of(steps, number / len(uids), (number + 1) / len(uids), name)
+                made.append(one)
+                if isinstance(one, PlacedPlants) and one.reason and not one.number:
+                    bare.append(f"{name}: {one.reason}")
             except TetFloraError as error:
                 if len(uids) == 1:
                     raise
@@ -384,7 +386,6 @@ class TETFLORA_OT_ground_cover(ModalJob, Operator, label="Ground Cover", needs=(
     soil: boolean(
         "Soil", "Give the ground a material in the colors of what lies there, unless it has one of yours", True
     )
-
     fallen: boolean(
         "Fallen Leaves",
         "With Seasons on, strew in a layer of their own the leaves that the plants above shed in autumn, "

@@ -61,7 +61,6 @@ class _Importing(FileJob, ImportHelper):
         "Put the middle of this file at the world origin. Otherwise it lies where it is in relation to what was "
         "imported before",
     )
-
     crop: once.choice(
         "Crop",
         "What to leave out of a large area",

@@ -197,9 +197,7 @@ class TETFLORA_OT_preview_levels(base.ModalJob, Operator, label="Compute Levels"
     """
 
     bl_options = {'REGISTER'}  # nothing in the file changes but the level that is shown
-
     cancelled = "Cancelled; the levels are unchanged"
-
     clear: once.boolean("Clear Levels", "Remove the levels from viewports and memory instead. The file does not change")
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:

@@ -59,12 +59,11 @@ class TETFLORA_OT_look(Reporting, Operator, label="Look from Here", needs=(in_ob
         if self.where != 'VIEW' and not len(ground):
             return self.failed("No mesh is visible to stand on; add a ground mesh, or show it")
         camera = _camera(scene)
+        matrix = view
         if self.where == 'EYE':
             matrix = _at_eye_height(scene, ground, view)
         elif self.where == 'ABOVE':
             matrix = _above(ground, view, camera.data)
-        else:
-            matrix = view
         camera.matrix_world = matrix
         far = max((matrix.translation - corner).length for corner in _corners(ground)) if len(ground) else 0.0
         camera.data.clip_end = max(camera.data.clip_end, 1.5 * far)

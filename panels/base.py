@@ -19,11 +19,7 @@ Draw = Callable[[bpy.types.UILayout, bpy.types.Context], None]
 
 
 def panel(
-    label: str,
-    manual: str,
-    tab: str = "",
-    poll: Callable[[bpy.types.Context], object] | None = None,
-    **options: object,
+    label: str, manual: str, tab: str = "", poll: Callable[[bpy.types.Context], object] | None = None, **options: object
 ) -> Callable[[Draw], type[bpy.types.Panel]]:
     """Make a panel of the function that draws it; labels are to the left of values, as elsewhere in Blender.
 

@@ -120,16 +120,14 @@ class Writer(Hand):
         yield from self.key(letter)
 
     def choose_own(self):
-        """The last picture of the gallery, after those of the catalog; then take the beech away."""
-        x, y = yield from self.click("ops.tetflora.edit_list(", self.beside_lists(), above=20)
-        yield 1.5
-        yield from self.ui.picture("own_trees_gallery")
-        self.ui.move(x - 682, y + 89)
+        """The menu of the species in the list, and the model in it."""
+        x, y = yield from self.click("layers[0].mix[0].species_choice", shift=True)
+        yield 1.0
+        yield from self.ui.picture("own_trees_menu")
+        self.ui.move(x - 203, y - 283)
         yield 0.3
         self.ui.press('LEFTMOUSE')
         yield 0.5
-        yield from self.click("Beech")
-        yield from self.click("ops.tetflora.edit_list(", self.beside_lists())
 
     def look_by_daylight(self, where=""):
         """The two buttons below Refine, and a choice in Adjust Last Operation."""

@@ -365,3 +365,27 @@ def test_undo_restores_everything_in_one_step(options):
     bpy.ops.ed.undo_push(message="updated")
     bpy.ops.ed.undo()
     assert _state() == before
+
+
+def test_a_second_scatter_does_not_look_for_room_where_the_first_has_its_plants() -> None:
+    for _ in range(2):
+        _populate(size=40.0, by_density=True, species="beech", min_distance=1.5)
+    first, second = _settings().layers
+    assert first.seed == 0 and second.seed != 0
+    assert second.made > first.made / 2
+    _populate(seed=7)
+    assert _active().seed == 7  # what a script asks for
+
+
+def test_of_several_layers_it_is_said_which_have_no_room(monkeypatch: pytest.MonkeyPatch) -> None:
+    for seed in (0, 1):
+        _populate(size=40.0, by_density=True, species="beech", seed=seed)
+    for layer in _settings().layers:
+        layer.density += 1.0
+    _settings().layers[1].min_distance, _settings().layers[1].distance_by_species = 60.0, False
+    said = []
+    monkeypatch.setattr(
+        bpy.types.TETFLORA_OT_update_layers, "done", lambda _self, text, **_: said.append(text) or {'FINISHED'}
+    )
+    _ops().update_layers()
+    assert f'without plants: {_settings().layers[1].name}: ' in said[0]

@@ -465,12 +465,36 @@ def test_scenes_without_plants_are_left_alone_in_rendered_shading(scene, shading
     assert shading('RENDERED')
 
 
-def test_what_rendered_shading_switched_on_goes_off_in_a_file_that_was_saved_so(scene, shading, tmp_path):
+def test_what_rendered_shading_switched_on_is_off_in_a_file_because_blender_opens_it_in_solid(scene, shading, tmp_path):
     assert shading('RENDERED')
     path = str(tmp_path / "saved.blend")
     bpy.ops.wm.save_as_mainfile(filepath=path, copy=True)
+    assert shading('RENDERED')
     bpy.ops.wm.open_mainfile(filepath=path)
-    assert bpy.context.scene.tetflora.auto_refine and not shading('SOLID')
+    assert not bpy.context.scene.tetflora.auto_refine and not shading('SOLID')
+
+
+def test_a_file_in_which_the_artist_has_it_on_is_refined_when_it_is_opened(scene, monkeypatch, tmp_path):
+    scene.tetflora.auto_refine = True
+    path = str(tmp_path / "saved.blend")
+    bpy.ops.wm.save_as_mainfile(filepath=path, copy=True)
+    bpy.ops.wm.open_mainfile(filepath=path)
+    assert bpy.context.scene.tetflora.auto_refine
+    assert settle(monkeypatch) > 5
+    assert results(bpy.context.scene)
+
+
+def test_while_the_artist_edits_it_does_not_claim_to_work(scene, monkeypatch):
+    scene.tetflora.auto_refine = True
+    half_make(scene, monkeypatch)
+    assert "%" in auto.message()
+    bpy.context.view_layer.objects.active = add_mesh("ground")
+    bpy.ops.object.mode_set(mode='EDIT')
+    auto._state.due = 0.0
+    assert auto.tick() == auto._BUSY and auto.message() == "Waits for Object Mode"
+    bpy.ops.object.mode_set(mode='OBJECT')
+    settle(monkeypatch)
+    assert auto.message() == "" and results(scene)
 
 
 def test_undo_of_a_step_before_leaves_it_as_the_shading_has_it(scene, shading):

@@ -13,7 +13,7 @@ import bpy
 from ..compat import stored_properties
 from ..placing.plant_objects import PAINTED_MARK, note_field, plant_collection
 from ..placing.populations import add_population
-from ..placing.rules import BIOME_ONLY, awaits_update, copy_settings, grounds_of, set_grounds
+from ..placing.rules import BIOME_ONLY, awaits_update, copy_settings, free_seed, grounds_of, set_grounds
 from ..runtime import Handlers
 from ..scene.fields import has_history, stored_size
 from ..settings import BIOME, FIELD, SCATTER, active_in, rules_of
@@ -137,8 +137,8 @@ def _copy_one(scene: bpy.types.Scene, uid: str, grounds: Sequence[bpy.types.Obje
     for key in ("kind", "source", "data", *BIOME_ONLY):
         setattr(new, key, getattr(source, key))
     set_grounds(new, [e.object for e in source.grounds] if grounds is None else grounds)
-    if grounds is None:  # where the plants of the original stand there is no room
-        new.seed = max(one.seed for one in layers) % (2**31 - 1) + 1
+    if grounds is None:
+        new.seed = free_seed(scene, new.seed)
     # A cover lies under the copy of what it lay under, or under that itself.
     new.covers = biome if source.covers == source.biome else source.covers
     new.biome = biome or (source.biome if grounds is None else "")

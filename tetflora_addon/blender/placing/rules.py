@@ -214,6 +214,12 @@ def awaits_update(population: bpy.types.PropertyGroup) -> bool:
     return not population.made or not population.placed_by or is_outdated(population)
 
 
+def free_seed(scene: bpy.types.Scene, seed: int) -> int:
+    """A seed, or another if a population has it: where that one's plants stand there is no room."""
+    taken = {layer.seed for layer in scene.tetflora.layers if layer.kind == SCATTER}
+    return max(taken) % (2**31 - 1) + 1 if seed in taken else seed
+
+
 def copy_settings(source: bpy.types.PropertyGroup, target: bpy.types.PropertyGroup) -> None:
     """Give a population the settings of another; identity, grounds and plants stay its own."""
     for prop in settings_of(source):

@@ -97,9 +97,9 @@ def _switched(scene: bpy.types.Scene) -> None:
 def _begin_anew(scene: bpy.types.Scene) -> None:
     stop()
     _state.message, _state.view = "", (0, "")
-    if scene.tetflora.auto_refine:
+    if scene is not None and scene.tetflora.auto_refine:
         schedule(scene)
-        watch()
+    watch()
 
 
 def _follows_viewport(scene: bpy.types.Scene) -> bool:
@@ -220,12 +220,13 @@ def tick() -> float | None:
     if _state.steps is None and wait > 0.0:
         return wait
     if _is_busy():
+        _state.message = "Waits for Object Mode" if bpy.context.mode != 'OBJECT' else ""
         return _BUSY
     _state.working = True
     try:
         more = _begin(scene) if _state.steps is None else _slice(scene)
     except GoneError:  # deleted by somebody of whom Blender has told nothing: what is left is refined anew
-        _state.steps, more = None, True
+        _state.steps, _state.message, more = None, "", True
         _state.due = time.monotonic() + QUIET
     except Exception as error:
         expected = isinstance(error, TetFloraError)
@@ -382,20 +383,19 @@ def after_undo(*_arguments: object) -> None:
 def on_load(*_arguments: object) -> None:
     """Another file: its results are none of ours."""
     stop()
-    for of_scenes in (_done, _seen, _known, _sharp):
+    for of_scenes in (_done, _seen, _known, _sharp, _state.ours, _state.refused):
         of_scenes.clear()
     _state.message, _state.view = "", (0, "")
-    _state.ours.clear()
-    _state.refused.clear()
     call_off(tick)
     call_off(watch)
 
 
-def on_loaded(*_: object) -> None:
-    """Where the file was saved in Rendered shading, that had switched it on."""
-    on = (scene for scene in bpy.data.scenes if scene.tetflora.auto_refine and is_rendered(scene))
-    _state.ours.update(scene.session_uid for scene in on)
-    watch()
+def before_save(*_arguments: object) -> None:
+    """Blender opens files in Solid shading: there, what Rendered shading has switched on is off."""
+    _state.working = True
+    for scene in (scene for scene in bpy.data.scenes if scene.session_uid in _state.ours):
+        scene.tetflora.auto_refine = False
+    _state.working = False
 
 
 _HANDLERS = Handlers(
@@ -407,7 +407,8 @@ _HANDLERS = Handlers(
     redo_post=after_undo,
     render_init=lambda *_: in_main_thread(on_interruption),
     load_pre=(on_interruption, on_load),
-    load_post=on_loaded,
+    load_post=lambda *_: _begin_anew(bpy.context.scene),
+    save_pre=before_save,
 )
 _FIRST = Part(lambda: call_soon(watch, _LOOK) if not bpy.app.background else None, lambda: None)
 register, unregister = in_order(listening(_switched, auto_refine_switched), _HANDLERS, _FIRST, end=on_load)
