@@ -590,7 +590,7 @@ def biome(scene: bpy.types.Scene, spec: dict, folder: Path) -> dict[str, Any]:
 
 def _before_trunks(scene: bpy.types.Scene, y: float) -> tuple[float, float]:
     """Where at an edge of the ground the first trunk in view is farthest: one before the eye would fill the picture."""
-    feet, sizes = warnings._crowns(scene, np.array([0.0, y, 0.0]))
+    feet, sizes = warnings.crowns_near(scene, np.array([0.0, y, 0.0]))
     trunks = feet[sizes[:, 1] > 4.0, :2]
     places = np.arange(-10.0, 10.5, 0.5)
     aside, ahead = np.abs(trunks[:, 0, None] - places), trunks[:, 1, None] - y

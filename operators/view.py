@@ -104,22 +104,22 @@ def _at_eye_height(scene: bpy.types.Scene, ground: Ground, view: Matrix) -> Matr
     hit = ground.cast(view.translation, ahead)
     corners = np.array(_corners(ground))
     middle = Vector(corners.mean(axis=0))
-    below = _below(ground, view.translation)
-    near = below is not None and view.translation.z - below < 10.0
+    below = _on_ground(ground, view.translation)
+    near = below != view.translation and view.translation.z - below.z < 10.0
     stand = view.translation if near else (Vector(hit[0]) if hit is not None else middle)
-    place = open_place(scene, np.array([stand.x, stand.y, (_below(ground, stand) or stand.z) + EYE_HEIGHT]))
-    height = _below(ground, Vector(place))
-    eye = Vector((place[0], place[1], (stand.z if height is None else height) + EYE_HEIGHT))
-    if not near and (middle - eye).xy.length > 0.2 * (corners.max(axis=0) - corners.min(axis=0))[:2].max():
-        flat = Vector(((middle - eye).x, (middle - eye).y, 0.0)).normalized()  # not out over the edge of the ground
+    if not near and (middle - stand).xy.length > 0.2 * (corners.max(axis=0) - corners.min(axis=0))[:2].max():
+        flat = Vector(((middle - stand).x, (middle - stand).y, 0.0)).normalized()  # not out over the edge of the ground
+    up = Vector((0.0, 0.0, EYE_HEIGHT))
+    place = Vector(open_place(scene, np.array(_on_ground(ground, stand) + up), np.array(flat)))
+    eye = _on_ground(ground, place - up) + up
     turn = (flat + Vector((0.0, 0.0, 0.06))).to_track_quat('-Z', 'Y')
     return Matrix.Translation(eye) @ turn.to_matrix().to_4x4()
 
 
-def _below(ground: Ground, place: Vector) -> float | None:
-    """Height of the ground under or over a place."""
+def _on_ground(ground: Ground, place: Vector) -> Vector:
+    """The ground under or over a place, or the place itself where there is none."""
     hit = ground.cast(Vector((place.x, place.y, place.z + 1e4)), Vector((0.0, 0.0, -1.0)))
-    return None if hit is None else float(hit[0][2])
+    return place.copy() if hit is None else Vector(hit[0])
 
 
 def _above(ground: Ground, view: Matrix, camera: bpy.types.Camera) -> Matrix:

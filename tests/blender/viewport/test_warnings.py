@@ -233,6 +233,20 @@ def test_a_camera_comes_to_the_ground_and_looks_at_it(where):
     assert "crown" not in _keys() and "clip" not in _keys()
 
 
+@pytest.mark.parametrize("move", [bpy.ops.tetflora.look, lambda: warnings.mend(bpy.context.scene, "crown")])
+def test_a_camera_at_eye_height_does_not_look_at_a_trunk(move):
+    """In a beech forest a trunk two meters ahead filled four fifths of the picture."""
+    add_mesh("ground", size=50.0)
+    beeches = [add_plant(f"beech {y}", species="beech", location=(0.0, y, 0.0)) for y in (-3.0, -1.0, 2.0)]
+    camera = add_camera(location=(0.0, -3.0, 1.7), rotation=(1.5708, 0.0, 0.0))
+    move()
+    bpy.context.view_layer.update()
+    place, ahead = camera.matrix_world.translation, -camera.matrix_world.to_3x3().col[2]
+    for beech in beeches:
+        way = (beech.location - place).xy
+        assert way.length > 5.0 or way.normalized() @ ahead.xy.normalized() < 0.9
+
+
 def test_an_animated_camera_stays_and_nothing_to_stand_on_is_told():
     camera = add_camera(location=(5.0, 0.0, 2.0))
     with pytest.raises(RuntimeError, match="No mesh is visible to stand on"):

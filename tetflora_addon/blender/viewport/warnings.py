@@ -32,6 +32,7 @@ _SIDE = 100.0  # of ground that was too small, meters
 #: Light of a world from all around that shows plants; a new file's gray is 0.05.
 _DARK = 0.1
 _NEAR = 20.0  # meters around the camera where crowns are looked at
+_TREE, _BEFORE = 4.0, 5.0  # height from which on a plant has a trunk, and how far one is that hides the view, meters
 _CLOSED = 0.6  # of the sky there; half of a picture is nearly black from two thirds on, and well lit at one half
 _OVERHEAD = 3.0  # meters above the camera, where crowns shade it
 
@@ -159,7 +160,7 @@ def _fields(scene: bpy.types.Scene) -> Iterator[tuple[bpy.types.Object, Floats]]
             yield field, positions(field)
 
 
-def _crowns(scene: bpy.types.Scene, at: Floats) -> tuple[Floats, Floats]:
+def crowns_near(scene: bpy.types.Scene, at: Floats) -> tuple[Floats, Floats]:
     """Feet (n, 3), and radii and heights (n, 2), of plants near a place, meters; sizes are 0 of unknown crowns."""
     found: list[tuple] = []  # feet, species, which of these each is, and scales
     for obj in plants_of(scene.objects):
@@ -184,7 +185,7 @@ def _crowns(scene: bpy.types.Scene, at: Floats) -> tuple[Floats, Floats]:
 def _camera(scene: bpy.types.Scene, place: Floats) -> Iterator[Warned]:
     camera = scene.camera
     at = np.array(camera.matrix_world.translation)
-    feet, sizes = _crowns(scene, at)
+    feet, sizes = crowns_near(scene, at)
     if _within(at, feet, sizes):
         text = f'"{camera.name}" is inside a crown: leaves fill the picture. Move takes it to the nearest open place'
         yield Warned("crown", "In a crown", text, "Move", _step_out)
@@ -223,23 +224,23 @@ def _within(at: Floats, feet: Floats, sizes: Floats) -> bool:
     return bool(((up >= 0.0) & (up <= height) & (away < reach)).any())
 
 
-def open_place(scene: bpy.types.Scene, at: Floats) -> Floats:
-    """The nearest place as high as one that is in no crown, on a grid of circles around it."""
-    crowns = _crowns(scene, at)
+def open_place(scene: bpy.types.Scene, at: Floats, ahead: Floats) -> Floats:
+    """The nearest place as high as one in no crown, from where no trunk hides what is ahead (3,); on circles around."""
+    feet, sizes = crowns_near(scene, at)
+    trunks, ahead = feet[sizes[:, 1] > _TREE, :2], ahead[:2] / max(np.linalg.norm(ahead[:2]), 1e-6)
     for away in np.arange(0.0, _NEAR, 0.5):
         for angle in np.linspace(0.0, 2.0 * np.pi, 16, endpoint=False):
             there = at + away * np.array([np.cos(angle), np.sin(angle), 0.0])
-            if not _within(there, *crowns):
+            way = trunks - there[:2]
+            away_ahead = np.linalg.norm(way, axis=1)
+            if not (_within(there, feet, sizes) or ((away_ahead < _BEFORE) & (way @ ahead > 0.9 * away_ahead)).any()):
                 return there
     return at
 
 
 def _step_out(scene: bpy.types.Scene) -> None:
-    camera = scene.camera
-    place = open_place(scene, np.array(camera.matrix_world.translation))
-    matrix = camera.matrix_world.copy()
-    matrix.translation = place
-    camera.matrix_world = matrix
+    eye = scene.camera.matrix_world
+    eye.translation = open_place(scene, np.array(eye.translation), -np.array(eye.col[2]))
 
 
 _outlook = Outlook(lambda scene, _layer: list(_look(scene)))
