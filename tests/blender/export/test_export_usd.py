@@ -172,8 +172,15 @@ def test_a_file_that_is_none_is_named(blender, tmp_path, pxr):
 def test_a_plant_without_a_species_is_named(blender, tmp_path):
     add_plant("lonely", "no_such_species")
     with pytest.raises(TetFloraError, match='"lonely": unknown species'):
-        export(tmp_path / "f.usdc")
+        export(tmp_path / "f.glb")
     assert list(tmp_path.iterdir()) == []
+
+
+def test_a_blender_without_usd_says_so_before_anything_is_made(blender, tmp_path, monkeypatch):
+    field()
+    monkeypatch.setattr("tetflora_addon.blender.export.usd.usd", lambda: None)
+    with pytest.raises(TetFloraError, match="built without USD; choose glTF or OBJ"):
+        next(export_steps(scene(), depsgraph(), ExportOrder(tmp_path / "f.usdc")))
 
 
 @pytest.mark.parametrize("suffix", ["usdc", "usda", "glb", "obj"])

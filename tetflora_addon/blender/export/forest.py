@@ -35,7 +35,7 @@ from ..scene.plants import Source, merged, read_sources
 from ..scene.skeletons import skeleton_object_of
 from ..worker import call_in_thread, steps_in_thread
 from .surfaces import with_surfaces
-from .usd import ENDINGS, halves, write_usd
+from .usd import ENDINGS, halves, library, write_usd
 
 
 @dataclass(frozen=True)
@@ -258,9 +258,10 @@ def export_steps(data: JobData, order: ExportOrder) -> Job[Exported]:
     TetFloraError
         There are no plants, or something cannot be read or written.
     """
-    writer = WRITERS.get(order.path.suffix.lower())
-    if writer is None:
+    if (writer := WRITERS.get(order.path.suffix.lower())) is None:
         raise TetFloraError(f'"{order.path.name}": choose a name that ends in {", ".join(WRITERS)}')
+    if writer is write_usd:
+        library()  # or it would say after minutes that there is none
     with written_whole(order.path) as folder:
         yield Progress(0.0, "reading plants")
         sources, seeds = read_plants(data)

@@ -52,8 +52,7 @@ def library() -> SimpleNamespace:
     TetFloraError
         This Blender has none.
     """
-    found = usd()
-    if found is None:
+    if (found := usd()) is None:
         raise TetFloraError("This Blender was built without USD; choose glTF or OBJ, or use another build")
     return found
 
