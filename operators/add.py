@@ -142,9 +142,7 @@ class TETFLORA_OT_populate(ModalJob, Operator, label="Scatter", needs=(in_object
     min_distance: _RULES.min_distance
     scale_min: _RULES.scale_min
     scale_max: _RULES.scale_max
-    species: once.string(
-        "Species", "Comma-separated identifiers of species with optional weights: broadleaf_tree:3, bush:1"
-    )
+    species: once.string("Species", "Comma-separated species with optional weights: broadleaf_tree:3, bush:1")
     suited: real(
         "Suited Distance",
         "Min Distance that followed from the species; another one was given",

@@ -21,7 +21,8 @@ from ..tetflora_addon.blender.placing.first_forest import is_startup
 from ..tetflora_addon.blender.placing.populations import PlacedPlants, make_plants_steps, remove_layer, reroll_steps
 from ..tetflora_addon.blender.placing.rules import active_population, grounds_of, set_grounds
 from ..tetflora_addon.blender.runtime import is_there
-from ..tetflora_addon.blender.settings import BIOME, FIELD, rules_of, with_identity
+from ..tetflora_addon.blender.settings import BIOME, FIELD, SCATTER, rules_of, with_identity
+from ..tetflora_addon.blender.species.edits import grow_in_wood
 from ..tetflora_addon.blender.stands import growing
 from ..tetflora_addon.blender.viewport import points
 from ..tetflora_addon.errors import SceneError, TetFloraError
@@ -94,6 +95,7 @@ class TETFLORA_OT_update_layers(ModalJob, Operator, label="Update", needs=_ACTIV
         (
             ('DUE', "All That Are Due", "All whose settings have changed, and those without plants"),
             ('ACTIVE', "Active", "The active layer, a biome with all of its layers and its soil, whatever has changed"),
+            ('WOOD', "Grown in a Wood", "The active layer, with slim trees, bare below, or with free ones again"),
         ),
     )
     reroll: once.boolean("Re-roll", "With a new seed, for another arrangement")
@@ -104,7 +106,8 @@ class TETFLORA_OT_update_layers(ModalJob, Operator, label="Update", needs=_ACTIV
         if properties.reroll or properties.forget_erased:
             name = "reroll" if properties.reroll else "forget_erased"
             return f"Grow the active layer again: {properties.bl_rna.properties[name].description}"
-        return cls.bl_description
+        which = properties.bl_rna.properties["which"].enum_items[properties.which]
+        return f"Grow again: {which.description}" if which.identifier == 'WOOD' else cls.bl_description
 
     def modal(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
         result = {'CANCELLED'}
@@ -118,7 +121,12 @@ class TETFLORA_OT_update_layers(ModalJob, Operator, label="Update", needs=_ACTIV
 
     def steps(self, context: bpy.types.Context) -> Job[Updated]:
         scene, depsgraph = context.scene, context.evaluated_depsgraph_get()
-        active, one = layers.active_layer(scene), self.which == 'ACTIVE'
+        active, one = layers.active_layer(scene), self.which != 'DUE'
+        if self.which == 'WOOD':
+            every = (*layers.children_of(active), active)
+            grow_in_wood(
+                scene, [entry for layer in every if layer.kind == SCATTER and not layer.frozen for entry in layer.mix]
+            )
         if one and active.kind == BIOME and not self.reroll:
             added = yield from adding.plant_biome_steps(scene, depsgraph, active)
             return [number for _, number in added.layers], added.bare, added.kept
@@ -179,9 +187,7 @@ class TETFLORA_OT_update_layers(ModalJob, Operator, label="Update", needs=_ACTIV
 
 
 class TETFLORA_OT_move_layer(Reporting, Operator, label="Move Layer", told="direction", needs=(layer_exists,)):
-    """Move the active layer in the list, a biome with all of its layers; of biomes with limits, those above come
-    first.
-    """
+    """Move the active layer, a biome with all of its layers. Of biomes with limits, those above come first."""
 
     direction: choice(
         "Direction",
@@ -237,9 +243,7 @@ class TETFLORA_OT_move_layer(Reporting, Operator, label="Move Layer", told="dire
 class TETFLORA_OT_duplicate_layer(Reporting, Operator, label="Duplicate Layer", needs=_ACTIVE):
     """Copy the active layer with all of its settings, a biome with its layers; *Update* then grows the copy."""
 
-    to_selected: once.boolean(
-        "To Selected Meshes", "Let the copy grow on the selected meshes instead of the same ground"
-    )
+    to_selected: once.boolean("To Selected Meshes", "Let the copy grow on the selected meshes")
 
     def run(self, context: bpy.types.Context) -> set[str]:
         grounds = selected_grounds(context) if self.to_selected else None
@@ -251,9 +255,7 @@ class TETFLORA_OT_duplicate_layer(Reporting, Operator, label="Duplicate Layer", 
 
 
 class TETFLORA_OT_remove_layer(Reporting, Operator, label="Remove Layer", needs=_ACTIVE):
-    """Remove the active layer and its plants, a biome with all of its layers. Plants of frozen layers and stands of
-    which a year is kept remain, and so does the ground.
-    """
+    """Remove the active layer and its plants, a biome with all of its layers. Frozen plants and kept years remain."""
 
     keep_plants: once.boolean("Keep Plants", "Remove only the layer, and keep its plants as plants of your own")
 
@@ -298,9 +300,7 @@ _may_be_saved = need(lambda context: saved_populations(context.scene), "Add a la
 
 
 class TETFLORA_OT_save_biome(Reporting, Operator, label="Save as Biome", needs=(_may_be_saved,), options={'REGISTER'}):
-    """Save the layers of the active biome to your folder of biomes, for use in all files and to share it; without a
-    biome, the layers on the ground of the active one.
-    """
+    """Save the layers of the active biome, or those on the ground of the active layer, to your folder of biomes."""
 
     name: string("Name", "Name of the biome, from which that of its file follows")
     description: string("Description", "What grows there, for the tooltip in menus")
@@ -327,9 +327,7 @@ class TETFLORA_OT_add_biome(ModalJob, Operator, label="Add Biome", needs=(in_obj
 
     biome: BIOMES()
     seed: once.integer("Seed", "A different seed gives a different arrangement")
-    season: once.boolean(
-        "Set Season", "Turn on Seasons and go to the day of the year that the biome is made for, if it has one"
-    )
+    season: once.boolean("Set Season", "Turn on Seasons, at the day of the year that the biome is made for")
 
     def steps(self, context: bpy.types.Context) -> Job[adding.BiomeResult]:
         yield Progress(0.0, "Reading the biome")
@@ -349,9 +347,8 @@ class TETFLORA_OT_add_biome(ModalJob, Operator, label="Add Biome", needs=(in_obj
             obj.hide_viewport = obj.hide_render = True
         try:
             context.view_layer.update()
-            made = yield from adding.add_biome_steps(
-                scene, context.evaluated_depsgraph_get(), biome, grounds, self.seed
-            )
+            depsgraph = context.evaluated_depsgraph_get()
+            made = yield from adding.add_biome_steps(scene, depsgraph, biome, grounds, self.seed)
         except BaseException:  # an error, or Esc
             if is_there(land):
                 bpy.data.meshes.remove(land.data)
@@ -377,21 +374,13 @@ class TETFLORA_OT_add_biome(ModalJob, Operator, label="Add Biome", needs=(in_obj
 
 
 class TETFLORA_OT_ground_cover(ModalJob, Operator, label="Ground Cover", needs=(in_object_mode, scatter_active)):
-    """Cover the ground under the active layer with grass, moss and herbs by the light there, and with leaves, branches
-    and logs of its species where they fall.
+    """Cover the ground under the active layer with what grows in the light there and with what its species shed.
 
     The cover is a layer of its own; use again to renew it after changes above.
     """
 
-    soil: boolean(
-        "Soil", "Give the ground a material in the colors of what lies there, unless it has one of yours", True
-    )
-    fallen: boolean(
-        "Fallen Leaves",
-        "With Seasons on, strew in a layer of their own the leaves that the plants above shed in autumn, "
-        "as many as are no longer on them",
-        True,
-    )
+    soil: boolean("Soil", "Give ground without a material of yours the colors of what lies there", True)
+    fallen: boolean("Fallen Leaves", "With Seasons on, add a layer of the leaves that the plants above shed", True)
 
     def steps(self, context: bpy.types.Context) -> Job[cover.CoverResult]:
         scene, depsgraph = context.scene, context.evaluated_depsgraph_get()
@@ -461,8 +450,7 @@ class TETFLORA_OT_animate_growth(Reporting, Operator, label="Animate Growth", ne
 
 
 class TETFLORA_OT_keep_year(Reporting, Operator, label="Keep Year", needs=_OF_STAND):
-    """Keep the active stand as it is in its present year, as an ordinary field of plants, and forget all other years
-    and their keys.
+    """Keep the active stand as it is this year, as an ordinary field of plants, and forget its other years and keys.
 
     The brush and other tools can then change it. Update brings the years back.
     """

@@ -56,9 +56,7 @@ class TETFLORA_OT_reseed(Reporting, Operator, label="Re-roll Seeds", needs=(plan
 class TETFLORA_OT_select_plants(Reporting, Operator, label="Select Plants", needs=(in_object_mode,)):
     """Select all plants of the same species as the active plant, or those of the active layer."""
 
-    species: once.string(
-        "Species", "Identifier of the species, which need not be in the catalog; that of the active plant if not set"
-    )
+    species: once.string("Species", "Identifier of any species; that of the active plant if not set")
     layer: once.boolean("Of Layer", "Those of the active layer, or its fields")
     extend: once.boolean("Extend", "Extend the current selection")
 

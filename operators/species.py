@@ -184,9 +184,7 @@ class TETFLORA_OT_delete_file(Reporting, Operator, label="Delete from My Files",
 
     biome: once.boolean("Biome", "A biome instead of a species")
     identifier: once.string("File", "Name of the file without its ending; the shown species or chosen biome if empty")
-    cache: once.boolean(
-        "Cache", "Delete all cached species analysis, and nothing else in the folder. It is computed again when needed"
-    )
+    cache: once.boolean("Cache", "Delete all cached species analysis; it is computed again when needed")
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
         return self.execute(context) if self.cache else context.window_manager.invoke_confirm(self, event)

@@ -105,6 +105,7 @@ def TETFLORA_MT_layers(layout: bpy.types.UILayout, context: bpy.types.Context) -
         layout,
         base.Button("update_layers", 'FILE_REFRESH', "Update This Layer", {"which": 'ACTIVE'}),
         base.Button("update_layers", 'LOOP_BACK', "Clear Erased Places", {"which": 'ACTIVE', "forget_erased": True}),
+        base.Button("update_layers", 'OUTLINER_OB_FORCE_FIELD', "Grown in a Wood", {"which": 'WOOD'}),
         base.Button("ground_cover", 'OUTLINER_OB_CURVES'),
         base.Button("ground_snow", 'FREEZE'),
         None,

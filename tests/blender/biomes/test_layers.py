@@ -11,6 +11,7 @@ from tests.blender.scenes import add_mesh, select
 from tetflora_addon.blender.biomes import layers
 from tetflora_addon.blender.compat import stored_properties
 from tetflora_addon.blender.placing import plant_objects, populations
+from tetflora_addon.blender.scene import crowns
 from tetflora_addon.blender.scene.fields import write_field
 
 pytestmark = pytest.mark.usefixtures("clean_file")
@@ -171,6 +172,23 @@ def test_update_grows_what_is_due_and_nothing_else():
     _group().layers[1].frozen = True
     assert _ops().update_layers() == {'FINISHED'}
     assert [layer.made for layer in _group().layers] == [3, 6]
+
+
+def test_trees_of_a_layer_grow_in_a_wood_and_free_again():
+    def species():
+        return {o.tetflora.species for o in bpy.context.scene.objects if o.tetflora.is_plant}
+
+    select(_ground(size=40.0))
+    _ops().populate(count=12, species="beech:1, bush:1")
+    in_wood = {"beech_in_wood", "bush"}
+    for found in (in_wood, {"beech", "bush"}, in_wood):
+        assert _ops().update_layers(which='WOOD') == {'FINISHED'}
+        assert {entry.species for entry in _group().layers[0].mix} == found == species()
+    free, dense = (crowns.crown_for(bpy.context.scene, name) for name in ("beech", "beech_in_wood"))
+    assert dense.radius < 0.8 * free.radius
+    _scatter("Bushes")
+    with pytest.raises(RuntimeError, match="has no trees"):
+        _ops().update_layers(which='WOOD')
 
 
 def test_the_eye_hides_plants_everywhere():

@@ -94,9 +94,7 @@ class TetFloraMixEntry(bpy.types.PropertyGroup, SpeciesChoice):
     """One species of a mixture to populate with, and its companion."""
 
     weight: real("Weight", "Relative frequency of this species among the plants", 1.0, **within(0.0, 10.0), **LIVE)
-    companion: string(
-        "Companion", "Identifier of the species that this one seeks or avoids; empty for none", **{**LIVE, **HIDDEN}
-    )
+    companion: string("Companion", "Species that this one seeks or avoids; empty for none", **{**LIVE, **HIDDEN})
     companion_choice: once.choice(
         "Companion",
         "Species that this one seeks or avoids, in this population or planted earlier",
@@ -107,9 +105,7 @@ class TetFloraMixEntry(bpy.types.PropertyGroup, SpeciesChoice):
     companion_strength: _COMPANION.strength
     companion_distance: _COMPANION.distance
     habitat: choice("Grows", "Where under the other plants this species is found", HABITATS, default='ANYWHERE', **LIVE)
-    shed_by: string(
-        "Shed By", "Identifier of the species that sheds what lies there; any if empty", **{**LIVE, **HIDDEN}
-    )
+    shed_by: string("Shed By", "Species that sheds what lies there; any if empty", **{**LIVE, **HIDDEN})
 
 
 class TetFloraGround(bpy.types.PropertyGroup):
@@ -200,9 +196,7 @@ class GroundMask:
 
     use_altitude: boolean("Altitude", "Grow only between two heights above the scene's origin", **{**LIVE, **HIDDEN})
 
-    vertex_group: string(
-        "Vertex Group", "Vertex group of the ground whose weights say where plants grow: 0 is bare, 1 is full", **LIVE
-    )
+    vertex_group: string("Vertex Group", "Of the ground: where plants grow, 0 is bare, 1 is full", **LIVE)
     invert_group: boolean("Invert Vertex Group", "Weight 1 is bare, 0 is full", **LIVE)
     image: pointer_to(
         bpy.types.Image, "Image", "Image whose brightness says where plants grow: black is bare, white is full", **LIVE
@@ -262,9 +256,7 @@ class TetFloraLayer(bpy.types.PropertyGroup, settings_in(Limits, Rules, **LIVE),
     name: string("Name", "Name of the layer, and of the collection of its plants")
     uid: string("Identity", **HIDDEN)
     kind: choice("Kind", "", [(k, k.title(), "") for k in (SCATTER, BIOME, FIELD)], **HIDDEN)
-    frozen: boolean(
-        "Freeze", "Keep the plants of this layer as they are: updates and removal leave them alone", **FIXED
-    )
+    frozen: boolean("Freeze", "Keep the plants of this layer: updates and removal leave them alone", **FIXED)
     shown: once.boolean(
         "Show", "Show the plants of this layer in viewports, results and renders", get=_is_shown, set=_show
     )

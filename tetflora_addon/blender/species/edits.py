@@ -15,7 +15,7 @@ import json
 import re
 import sys
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, suppress
 from functools import lru_cache
 from pathlib import Path
@@ -45,6 +45,8 @@ from .asset_species import asset_infos, asset_species, copy_asset, find_asset, l
 #: Custom property of collections: JSON of species by their identifiers, see `pack`.
 PAGES = "tetflora_pages"
 _FALLBACK_HEIGHT = 5.0  # meters, of the arrow of a plant whose species cannot be read
+#: What identifiers of trees in a wood end in, how far they are its trees, and the least height of a tree, meters.
+_IN_WOOD, _HABIT, _TREE = "_in_wood", 0.6, 4.0
 
 #: Called after every change of a species, without arguments; the preview listens.
 listeners = Listeners()
@@ -285,6 +287,26 @@ def store_species(scene: bpy.types.Scene, identifier: str, data: dict[str, Any])
     if edit.text != text:
         edit.text = text
         tell_listeners()
+
+
+def grow_in_wood(scene: bpy.types.Scene, entries: Iterable[bpy.types.PropertyGroup]) -> None:
+    """Let trees in lists of species be those that grow between others; if all are, those that stand free.
+
+    Raises
+    ------
+    SpeciesError
+        There are none.
+    """
+    trees = [e for e in entries if find_asset(None, e.species) is None and display_height(e.species) > _TREE]
+    if not trees:
+        raise SpeciesError("The layer has no trees, or only objects")
+    free = all(entry.species.endswith(_IN_WOOD) for entry in trees)
+    for entry in trees:
+        name = entry.species.removesuffix(_IN_WOOD) + ("" if free else _IN_WOOD)
+        if not free and find_edit(scene, name) is None:
+            page = species_data(scene, entry.species)
+            store_species(scene, name, {**page, "name": f"{page['name']} in a Wood", "habit": _HABIT})
+        entry.species = name
 
 
 def revert_species(identifier: str) -> int:
