@@ -20,6 +20,7 @@ several scripts each begins with the startup file, whether or not the one before
 
 from __future__ import annotations
 
+import faulthandler
 import importlib.util
 import json
 import os
@@ -212,6 +213,7 @@ def _all_steps(runs: Sequence[tuple[Path, Path]]) -> Iterator[float | None]:
 
 def main(runs: Sequence[tuple[Path, Path]]) -> None:
     """Load scripts, one after the other, and run their steps."""
+    faulthandler.enable()  # the log tells what all threads did when Blender crashed
     bpy.context.preferences.view.show_splash = False
     bpy.context.preferences.system.viewport_aa = 'OFF'  # eight draws otherwise, and each takes half a second
     bpy.utils.register_class(_Note)

@@ -98,9 +98,7 @@ class _Raster(_Importing):
         **within(1e-6, 10.0, 1e6),
         precision=4,
     )
-    offset: once.real(
-        "Height Offset", "What is added to all values, meters", **within(-20_000.0, high=20_000.0), unit='LENGTH'
-    )
+    offset: once.real("Height Offset", "Added to all values", **within(-20_000.0, high=20_000.0), unit='LENGTH')
 
     def order(self, context: bpy.types.Context, **others: Any) -> Import:
         """What is to be imported, with the other chosen files as tiles."""

@@ -118,7 +118,19 @@ def test_no_other_thread_touches_blenders_timers(window) -> None:
     elsewhere(runtime.open_menu, "TETFLORA_MT_nothing_refined")
     assert not window.timers
     main_thread._asked.popleft().make()  # in the main thread, the request for a timer reaches it
-    assert window.timers == [(threading.main_thread(), main_thread.make_changes, {"first_interval": 0.5})]
+    timer = runtime._after_renders(main_thread.make_changes)
+    assert window.timers == [(threading.main_thread(), timer, {"first_interval": 0.5})]
+
+
+def test_timers_wait_while_a_render_goes_on(monkeypatch) -> None:
+    """An estimate was looked for in the main thread while a render evaluated the scene: Blender crashed."""
+    rendering, calls = ['RENDER'], []
+    app = SimpleNamespace(is_job_running=rendering.__contains__)
+    monkeypatch.setattr(runtime, "bpy", SimpleNamespace(app=app))
+    timer = runtime._after_renders(lambda: calls.append(1))
+    assert 0.1 < timer() < 1.0 and not calls
+    rendering.clear()
+    assert timer() is None and calls
 
 
 def test_an_error_that_nobody_waits_for_is_printed_and_ends_nothing(window, capsys) -> None:

@@ -11,7 +11,7 @@ import sys
 import time
 from collections.abc import Callable, Generator, Iterable, Iterator
 from contextlib import contextmanager
-from functools import partial, wraps
+from functools import cache, partial, wraps
 from math import inf
 from pathlib import Path
 from textwrap import wrap
@@ -109,12 +109,18 @@ def classes_in(modules: Iterable[object], *kinds: type) -> tuple[type, ...]:
     )
 
 
+@cache
+def _after_renders(function: Callable[[], float | None]) -> Callable[[], float | None]:
+    """A timer that waits while a render goes on: its thread evaluates scenes, and what else did so crashed Blender."""
+    return lambda: 0.5 if bpy.app.is_job_running('RENDER') else function()
+
+
 def call_soon(function: Callable[[], float | None], seconds: float) -> None:
     """Call a function of a module by a timer, once for all requests until then; from any thread, as of a render."""
     if not on_main_thread():
         later(partial(call_soon, function, seconds))
-    elif not bpy.app.timers.is_registered(function):
-        bpy.app.timers.register(function, first_interval=seconds)
+    elif not bpy.app.timers.is_registered(timer := _after_renders(function)):
+        bpy.app.timers.register(timer, first_interval=seconds)
 
 
 def call_off(function: Callable[[], float | None]) -> None:
@@ -122,8 +128,8 @@ def call_off(function: Callable[[], float | None]) -> None:
 
     Do so before a file is loaded as well: Blender 4.5's wheel hangs at exit if Blender itself dropped the timer.
     """
-    if bpy.app.timers.is_registered(function):
-        bpy.app.timers.unregister(function)
+    if bpy.app.timers.is_registered(timer := _after_renders(function)):
+        bpy.app.timers.unregister(timer)
 
 
 _Result = TypeVar("_Result")

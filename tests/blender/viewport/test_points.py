@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from tests.blender.scenes import add_mesh, depsgraph, select
+from tetflora_addon.blender.runtime import _after_renders
 from tetflora_addon.blender.viewport import points
 
 pytestmark = pytest.mark.usefixtures("clean_file")
@@ -70,7 +71,7 @@ def test_in_the_background_nothing_is_drawn():
         assert bpy.app.background
         assert points.switch.shown_in(bpy.context.scene)
         assert points._state.handle is None
-        assert not bpy.app.timers.is_registered(points.switch.refresh)
+        assert not bpy.app.timers.is_registered(_after_renders(points.switch.refresh))
     finally:
         points.switch.show(bpy.context.scene, False)
     assert points._state.handle is None

@@ -17,6 +17,7 @@ from devtools.partition import partition
 from panels.refine import TETFLORA_PT_refine
 from tests.blender.scenes import add_camera, add_plant, datablocks, depsgraph
 from tetflora_addon import errors
+from tetflora_addon.blender.runtime import _after_renders
 from tetflora_addon.blender.scene.fields import write_field
 from tetflora_addon.blender.viewport import auto, levels, overlay, state
 from tetflora_addon.blender.viewport.levels import _on_timer, _on_update, level_steps, read_shapes
@@ -289,7 +290,7 @@ def test_nothing_draws_or_waits_in_the_background():
     scene, _, _ = scene_of_plants()
     scene.tetflora.preview.plants = 'LIGHT'
     assert overlay._handles == []
-    assert not bpy.app.timers.is_registered(_on_timer)
+    assert not bpy.app.timers.is_registered(_after_renders(_on_timer))
 
 
 def test_a_scene_without_plants_is_not_read(monkeypatch):

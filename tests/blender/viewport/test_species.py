@@ -10,6 +10,7 @@ import pytest
 
 from devtools import session
 from tests.blender.scenes import add_camera, add_plant, datablocks, select
+from tetflora_addon.blender.runtime import _after_renders
 from tetflora_addon.blender.scene import objects
 from tetflora_addon.blender.viewport import points, species
 
@@ -57,7 +58,7 @@ def test_shows_the_plant_of_the_editor_at_the_cursor(preview):
 
 def test_follows_changes_and_keeps_the_last_sound_plant(preview):
     editor = _switch_on(preview)
-    timers = bpy.app.timers
+    timers, timer = bpy.app.timers, _after_renders(preview.switch.refresh)
     before, name = len(_objects()[0].data.polygons), _objects()[0].name
     for change in (
         lambda: setattr(editor, "preview_seed", 7),
@@ -65,10 +66,10 @@ def test_follows_changes_and_keeps_the_last_sound_plant(preview):
         lambda: setattr(editor, "species_choice", "conifer"),
         bpy.ops.tetflora.duplicate_species,
     ):
-        if timers.is_registered(preview.switch.refresh):
-            timers.unregister(preview.switch.refresh)
+        if timers.is_registered(timer):
+            timers.unregister(timer)
         change()
-        assert timers.is_registered(preview.switch.refresh)
+        assert timers.is_registered(timer)
     preview.switch.refresh()
     (shown,) = _objects()
     assert shown.name == name
