@@ -577,25 +577,18 @@ def biome(scene: bpy.types.Scene, spec: dict, folder: Path) -> dict[str, Any]:
     forest.add_light(scene)
     side = land.dimensions.y
     forest.add_camera(scene, forest.Case((), eye=_EYE, side=side))
-    x, y = _before_trunks(scene, -0.49 * side)
-    hit, place, *_ = land.ray_cast((x, y, 1e3), (0.0, 0.0, -1.0))
-    scene.camera.location = x, y, _EYE + (place.z if hit else 0.0)
+    eye = np.array([0.0, -0.49 * side, 0.0])
+    for _ in range(2):  # on the ground, and again where no trunk fills the picture
+        hit, place, *_ = land.ray_cast((*eye[:2], 1e3), (0.0, 0.0, -1.0))
+        eye[2] = _EYE + (place.z if hit else 0.0)
+        eye[:2] = warnings.open_place(scene, eye, np.array([0.0, 1.0, 0.0]))[:2]
+    scene.camera.location = eye
     scene.camera.rotation_euler = np.pi / 2.0, 0.0, 0.0
     scene.render.resolution_x, scene.render.resolution_y = spec["size"]
     scene.render.resolution_percentage = 100
     scene.tetflora.refine_at_render, scene.tetflora.quality = False, spec["quality"]
     bpy.context.view_layer.update()
     return {"facet_set": scene.tetflora.facet} | _refined(scene, spec) | _sides(scene, folder)
-
-
-def _before_trunks(scene: bpy.types.Scene, y: float) -> tuple[float, float]:
-    """Where at an edge of the ground the first trunk in view is farthest: one before the eye would fill the picture."""
-    feet, sizes = warnings.crowns_near(scene, np.array([0.0, y, 0.0]))
-    trunks = feet[sizes[:, 1] > 4.0, :2]
-    places = np.arange(-10.0, 10.5, 0.5)
-    aside, ahead = np.abs(trunks[:, 0, None] - places), trunks[:, 1, None] - y
-    first = np.where((ahead > 0.0) & (aside < ahead), ahead, np.inf).min(axis=0, initial=np.inf)
-    return float(places[np.argmax(first)]), y
 
 
 def checked(scene: bpy.types.Scene, spec: dict, folder: Path) -> dict[str, float]:

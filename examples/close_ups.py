@@ -66,6 +66,7 @@ class Subject:
 
     def __init__(self, identifier: str) -> None:
         from tetflora_addon.blender.job.plant_mesh import single_seed
+        from tetflora_addon.blender.species.edits import in_wood
         from tetflora_addon.compiled.flora import compile_species
         from tetflora_addon.compiled.sizes import crown_of
         from tetflora_addon.growth.axes import axes
@@ -76,7 +77,7 @@ class Subject:
 
         habit = _AMONG_OTHERS.get(identifier, 0.0)
         species = replace(catalog.load_species(identifier), habit=habit)
-        self.planted = among_others(bpy.context.scene, identifier, habit) if habit else identifier
+        self.planted = in_wood(bpy.context.scene, identifier, habit)
         self.identifier, self.crown = identifier, crown_of(with_habit(species, habit))
         flora = compile_species([species])
         stem = trunks(flora.rows, single_seed(identifier, 1))
@@ -205,17 +206,6 @@ def face_on_leaf(
     out = middle @ (toward * [1.0, 1.0, 0.0])
     low = (middle[:, 2] > lowest) & (middle[:, 2] < np.quantile(middle[:, 2], highest))
     return middle[np.where(low, out + _FACING * facing, -np.inf).argmax()]
-
-
-def among_others(scene: bpy.types.Scene, species: str, habit: float) -> str:
-    """Identifier of the same species as it grows in a wood, which the file then has."""
-    from tetflora_addon.blender.species.edits import find_edit, species_data, store_species
-
-    name = f"{species}_in_wood"
-    if find_edit(scene, name) is None:
-        page = species_data(scene, species)
-        store_species(scene, name, {**page, "name": f"{page['name']} in a Wood", "habit": habit})
-    return name
 
 
 def render(

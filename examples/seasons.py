@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 from devtools import session
 
 from . import stage
-from .close_ups import among_others, render
+from .close_ups import render
 from .paper.pictures import save_sheet
 from .wood import grid
 
@@ -178,6 +178,7 @@ def _ground(name: str, side: float, step: float, hole: float) -> bpy.types.Objec
 def _plant(scene: bpy.types.Scene, ground: bpy.types.Object) -> None:
     """Plant the hill and its edge on a ground, and cover all of it."""
     from tetflora_addon.blender.placing import cover, populations
+    from tetflora_addon.blender.species.edits import in_wood
     from tetflora_addon.blender.worker import run_to_end
 
     for mask, mix, apart, density, sizes, habit in (
@@ -187,7 +188,7 @@ def _plant(scene: bpy.types.Scene, ground: bpy.types.Object) -> None:
         some = populations.add_population(scene, [ground], name=f"{ground.name} {mask}")
         for species, weight in mix.items():
             entry = some.mix.add()
-            entry.species, entry.weight = (among_others(scene, species, habit) if habit else species), weight
+            entry.species, entry.weight = in_wood(scene, species, habit), weight
         some.vertex_group, some.min_distance = mask, apart
         some.by_density, some.density = True, density
         some.scale_min, some.scale_max, some.seed = *sizes, 3

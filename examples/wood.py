@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 from devtools import session
 
 from . import stage
-from .close_ups import among_others, face_on_leaf, render
+from .close_ups import face_on_leaf, render
 from .paper.pictures import save_sheet
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -123,13 +123,14 @@ def _ground(name: str, side: float, step: float, hole: float) -> bpy.types.Objec
 def _plant(scene: bpy.types.Scene, ground: bpy.types.Object) -> None:
     """Plant the wood on a ground, and cover all of it."""
     from tetflora_addon.blender.placing import cover, populations
+    from tetflora_addon.blender.species.edits import in_wood
     from tetflora_addon.blender.worker import run_to_end
 
     depsgraph = bpy.context.evaluated_depsgraph_get()
     wood = populations.add_population(scene, [ground], name=f"{ground.name} wood")
     for species, weight in TREES.items():
         entry = wood.mix.add()
-        entry.species, entry.weight = among_others(scene, species, _HABIT), weight
+        entry.species, entry.weight = in_wood(scene, species, _HABIT), weight
     wood.vertex_group, wood.min_distance = _MASK, _APART
     wood.by_density, wood.density = True, _DENSITY
     wood.scale_min, wood.scale_max, wood.seed = 0.6, 1.15, 3

@@ -45,7 +45,7 @@ class TETFLORA_OT_export_forest(
         "Leave out levels of detail with more polygons than this; 0 for none",
         **within(0, 1_000_000, 100_000_000),
     )
-    bake: once.boolean("Bake Materials", "Bake veins, bark and relief with Cycles; else colors and outlines", True)
+    bake: once.boolean("Bake Materials", "Bake veins, bark and relief with Cycles, not only colors and outlines", True)
 
     @property
     def filename_ext(self) -> str:

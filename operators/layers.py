@@ -95,7 +95,7 @@ class TETFLORA_OT_update_layers(ModalJob, Operator, label="Update", needs=_ACTIV
         (
             ('DUE', "All That Are Due", "All whose settings have changed, and those without plants"),
             ('ACTIVE', "Active", "The active layer, a biome with all of its layers and its soil, whatever has changed"),
-            ('WOOD', "Grown in a Wood", "The active layer, with slim trees, bare below, or with free ones again"),
+            ('WOOD', "Grown in a Wood", "The active layer, with trees of a dense stand or, again, open-grown ones"),
         ),
     )
     reroll: once.boolean("Re-roll", "With a new seed, for another arrangement")
@@ -106,8 +106,9 @@ class TETFLORA_OT_update_layers(ModalJob, Operator, label="Update", needs=_ACTIV
         if properties.reroll or properties.forget_erased:
             name = "reroll" if properties.reroll else "forget_erased"
             return f"Grow the active layer again: {properties.bl_rna.properties[name].description}"
-        which = properties.bl_rna.properties["which"].enum_items[properties.which]
-        return f"Grow again: {which.description}" if which.identifier == 'WOOD' else cls.bl_description
+        if properties.which == 'WOOD':
+            return "Give the active layer the slim, bare-stemmed trees of a dense stand, or open-grown ones again"
+        return cls.bl_description
 
     def modal(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
         result = {'CANCELLED'}
@@ -124,9 +125,8 @@ class TETFLORA_OT_update_layers(ModalJob, Operator, label="Update", needs=_ACTIV
         active, one = layers.active_layer(scene), self.which != 'DUE'
         if self.which == 'WOOD':
             every = (*layers.children_of(active), active)
-            grow_in_wood(
-                scene, [entry for layer in every if layer.kind == SCATTER and not layer.frozen for entry in layer.mix]
-            )
+            grown = (layer.mix for layer in every if layer.kind == SCATTER and not layer.frozen)
+            grow_in_wood(scene, [entry for mix in grown for entry in mix])
         if one and active.kind == BIOME and not self.reroll:
             added = yield from adding.plant_biome_steps(scene, depsgraph, active)
             return [number for _, number in added.layers], added.bare, added.kept
@@ -327,7 +327,7 @@ class TETFLORA_OT_add_biome(ModalJob, Operator, label="Add Biome", needs=(in_obj
 
     biome: BIOMES()
     seed: once.integer("Seed", "A different seed gives a different arrangement")
-    season: once.boolean("Set Season", "Turn on Seasons, at the day of the year that the biome is made for")
+    season: once.boolean("Set Season", "Turn on Seasons and go to the day of the year that the biome is made for")
 
     def steps(self, context: bpy.types.Context) -> Job[adding.BiomeResult]:
         yield Progress(0.0, "Reading the biome")
@@ -379,7 +379,7 @@ class TETFLORA_OT_ground_cover(ModalJob, Operator, label="Ground Cover", needs=(
     The cover is a layer of its own; use again to renew it after changes above.
     """
 
-    soil: boolean("Soil", "Give ground without a material of yours the colors of what lies there", True)
+    soil: boolean("Soil", "Color ground that has no material of yours like what lies on it", True)
     fallen: boolean("Fallen Leaves", "With Seasons on, add a layer of the leaves that the plants above shed", True)
 
     def steps(self, context: bpy.types.Context) -> Job[cover.CoverResult]:

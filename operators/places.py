@@ -53,9 +53,7 @@ class _Importing(FileJob, ImportHelper):
         "UTM. 0 uses what the file says",
         **within(0, high=999_999),
     )
-    plain: once.boolean(
-        "Plain Meters", "Take coordinates for meters of a plane, whatever the file says of its coordinate system"
-    )
+    plain: once.boolean("Plain Meters", "Take coordinates for meters of a plane, whatever the file says of them")
     new_origin: once.boolean(
         "New Origin",
         "Put the middle of this file at the world origin. Otherwise it lies where it is in relation to what was "

@@ -28,7 +28,7 @@ def eevee_engine() -> str:
 
 def handlers(name: str) -> list:
     """Functions that Blender calls; of ``exit_pre``, which 4.5 lacks, a list that nobody reads."""
-    return getattr(bpy.app.handlers, name, [])
+    return getattr(bpy.app.handlers, name, []) if name == "exit_pre" else getattr(bpy.app.handlers, name)
 
 
 def stored_properties(owner: bpy.types.ID) -> Any | None:

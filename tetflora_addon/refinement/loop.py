@@ -338,8 +338,8 @@ def refine(
         kind.update(tree, divided, np.where(divided, np.inf, 0.0))
     clock.lap("update")
     shadowed = bool(lights) and settings.shadow_cutoff > 0.0
-    every = np.concatenate([seeds.position, placed.instances.position, polygons.center])
-    ground = seen_ground(camera, occluders, float(np.median(every[:, 2]))) if shadowed else None
+    heights = [places[:, 2] for places in (seeds.position, placed.instances.position, polygons.center)]
+    ground = seen_ground(camera, occluders, float(np.median(np.concatenate(heights)))) if shadowed else None
     buffers = Buffers(camera, settings.visibility_resolution, occluders)
     # Generations count from the root's own pieces. Passes do not count: a late one may divide what is still coarse.
     deepest = tree.levels - 1 + settings.max_levels

@@ -196,7 +196,7 @@ class GroundMask:
 
     use_altitude: boolean("Altitude", "Grow only between two heights above the scene's origin", **{**LIVE, **HIDDEN})
 
-    vertex_group: string("Vertex Group", "Of the ground: where plants grow, 0 is bare, 1 is full", **LIVE)
+    vertex_group: string("Vertex Group", "Weights that say where plants grow: 0 is bare, 1 is full", **LIVE)
     invert_group: boolean("Invert Vertex Group", "Weight 1 is bare, 0 is full", **LIVE)
     image: pointer_to(
         bpy.types.Image, "Image", "Image whose brightness says where plants grow: black is bare, white is full", **LIVE
@@ -257,9 +257,7 @@ class TetFloraLayer(bpy.types.PropertyGroup, settings_in(Limits, Rules, **LIVE),
     uid: string("Identity", **HIDDEN)
     kind: choice("Kind", "", [(k, k.title(), "") for k in (SCATTER, BIOME, FIELD)], **HIDDEN)
     frozen: boolean("Freeze", "Keep the plants of this layer: updates and removal leave them alone", **FIXED)
-    shown: once.boolean(
-        "Show", "Show the plants of this layer in viewports, results and renders", get=_is_shown, set=_show
-    )
+    shown: once.boolean("Show", "Show the layer in viewports, results and renders", get=_is_shown, set=_show)
     field: pointer_to(bpy.types.Object, "Field", **HIDDEN)
     source: string("Source", **HIDDEN)  # identifier of the file that a biome was made from
     data: string("Data", **HIDDEN)  # of that file: what is not in layers, as JSON

@@ -299,14 +299,19 @@ def grow_in_wood(scene: bpy.types.Scene, entries: Iterable[bpy.types.PropertyGro
     """
     trees = [e for e in entries if find_asset(None, e.species) is None and display_height(e.species) > _TREE]
     if not trees:
-        raise SpeciesError("The layer has no trees, or only objects")
-    free = all(entry.species.endswith(_IN_WOOD) for entry in trees)
-    for entry in trees:
-        name = entry.species.removesuffix(_IN_WOOD) + ("" if free else _IN_WOOD)
-        if not free and find_edit(scene, name) is None:
-            page = species_data(scene, entry.species)
-            store_species(scene, name, {**page, "name": f"{page['name']} in a Wood", "habit": _HABIT})
+        raise SpeciesError("The layer has no trees of the catalog; stands are woods already")
+    habit = 0.0 if all(entry.species.endswith(_IN_WOOD) for entry in trees) else _HABIT
+    names = [in_wood(scene, entry.species.removesuffix(_IN_WOOD), habit) for entry in trees]  # all, or an error
+    for entry, name in zip(trees, names, strict=True):
         entry.species = name
+
+
+def in_wood(scene: bpy.types.Scene, identifier: str, habit: float) -> str:
+    """Identifier of a species with a forest habit, kept in the file, or without; errors are those of `species_data`."""
+    page, name = species_data(scene, identifier), identifier + _IN_WOOD
+    if habit and find_edit(scene, name) is None:
+        store_species(scene, name, {**page, "name": f"{page['name']} in a Wood", "habit": habit})
+    return name if habit else identifier
 
 
 def revert_species(identifier: str) -> int:

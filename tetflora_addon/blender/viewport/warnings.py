@@ -160,7 +160,7 @@ def _fields(scene: bpy.types.Scene) -> Iterator[tuple[bpy.types.Object, Floats]]
             yield field, positions(field)
 
 
-def crowns_near(scene: bpy.types.Scene, at: Floats) -> tuple[Floats, Floats]:
+def _crowns(scene: bpy.types.Scene, at: Floats) -> tuple[Floats, Floats]:
     """Feet (n, 3), and radii and heights (n, 2), of plants near a place, meters; sizes are 0 of unknown crowns."""
     found: list[tuple] = []  # feet, species, which of these each is, and scales
     for obj in plants_of(scene.objects):
@@ -185,7 +185,7 @@ def crowns_near(scene: bpy.types.Scene, at: Floats) -> tuple[Floats, Floats]:
 def _camera(scene: bpy.types.Scene, place: Floats) -> Iterator[Warned]:
     camera = scene.camera
     at = np.array(camera.matrix_world.translation)
-    feet, sizes = crowns_near(scene, at)
+    feet, sizes = _crowns(scene, at)
     if _within(at, feet, sizes):
         text = f'"{camera.name}" is inside a crown: leaves fill the picture. Move takes it to the nearest open place'
         yield Warned("crown", "In a crown", text, "Move", _step_out)
@@ -225,8 +225,8 @@ def _within(at: Floats, feet: Floats, sizes: Floats) -> bool:
 
 
 def open_place(scene: bpy.types.Scene, at: Floats, ahead: Floats) -> Floats:
-    """The nearest place as high as one in no crown, from where no trunk hides what is ahead (3,); on circles around."""
-    feet, sizes = crowns_near(scene, at)
+    """The place (3,) nearest to one (3,), in meters, in no crown and with no trunk close ahead in a direction (3,)."""
+    feet, sizes = _crowns(scene, at)
     trunks, ahead = feet[sizes[:, 1] > _TREE, :2], ahead[:2] / max(np.linalg.norm(ahead[:2]), 1e-6)
     for away in np.arange(0.0, _NEAR, 0.5):
         for angle in np.linspace(0.0, 2.0 * np.pi, 16, endpoint=False):
