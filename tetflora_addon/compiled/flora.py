@@ -14,7 +14,7 @@ more, but all together for as much as is expected.
 from collections.abc import Callable, Container, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
-from typing import Any, ClassVar, Self
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -73,9 +73,6 @@ class Flora:
     Totals are those of a sub-plant where the crown's branches are longest (vigor 1); of what follows the length, a
     shorter one has the fraction that `growth.fullness` gives.
     """
-
-    #: Other processes keep it, and what it has computed for itself, see `processes.pool`.
-    sent_once: ClassVar[bool] = True
 
     species: tuple[Species, ...]
     forms: tuple[tuple[tuple[LeafModel, ...], ...], ...]  # by species and kind of leaf

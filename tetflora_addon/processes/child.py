@@ -100,7 +100,7 @@ def main() -> None:
     clock = _Clock(memory.give_back)
     while True:
         try:
-            (kind, *rest) = messages.receive(given, shared)
+            (kind, *rest) = messages.receive(given)
         except messages.Closed:
             return
         clock.busy = True

@@ -5,10 +5,9 @@
 Both ends are this very code in the same installation, so pickles are never read from anybody else.
 """
 
-import io
 import pickle
 import struct
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Sequence
 from typing import BinaryIO
 
 #: Bytes up to which arrays go within the pickle.
@@ -20,41 +19,10 @@ class Closed(EOFError):
     """The other process has ended."""
 
 
-class _Pickler(pickle.Pickler):
-    """Leaves out what the receiver has already."""
-
-    def __init__(self, *given: object, known: Callable[[object], int | None], **named: object) -> None:
-        super().__init__(*given, **named)
-        self._known = known
-
-    def persistent_id(self, thing: object) -> int | None:
-        """Number of a thing that is sent apart; None for others."""
-        return self._known(thing)
-
-
-class _Unpickler(pickle.Unpickler):
-    """Puts in what is there already."""
-
-    def __init__(self, *given: object, things: Mapping[int, object], **named: object) -> None:
-        super().__init__(*given, **named)
-        self._things = things
-
-    def persistent_load(self, number: int) -> object:
-        """The thing of a number."""
-        return self._things[number]
-
-
 class Packed:
-    """An object as the bytes that are sent, so that they are made once for several receivers.
+    """An object as the bytes that are sent, so that they are made once for several receivers."""
 
-    Parameters
-    ----------
-    thing : object
-    known : callable, optional
-        Number of an object within it that is sent apart; None for all others.
-    """
-
-    def __init__(self, thing: object, known: Callable[[object], int | None] | None = None) -> None:
+    def __init__(self, thing: object) -> None:
         arrays: list[memoryview] = []
 
         def apart(buffer: pickle.PickleBuffer) -> bool:
@@ -64,18 +32,8 @@ class Packed:
             arrays.append(raw)
             return False
 
-        if known is None:
-            data: bytes | memoryview = pickle.dumps(thing, protocol=5, buffer_callback=apart)
-        else:
-            stream = io.BytesIO()
-            _Pickler(stream, known=known, protocol=5, buffer_callback=apart).dump(thing)
-            data = stream.getvalue()
+        data = pickle.dumps(thing, protocol=5, buffer_callback=apart)
         self.parts: Sequence[bytes | memoryview] = (data, *arrays)
-
-    @property
-    def nbytes(self) -> int:
-        """Bytes of the message."""
-        return sum(memoryview(part).nbytes for part in self.parts)
 
 
 def send(stream: BinaryIO, *things: object) -> None:
@@ -97,14 +55,8 @@ def send(stream: BinaryIO, *things: object) -> None:
     stream.flush()
 
 
-def receive(stream: BinaryIO, things: Mapping[int, object] | None = None) -> list[object]:
+def receive(stream: BinaryIO) -> list[object]:
     """Objects of the next message; their arrays can be written to.
-
-    Parameters
-    ----------
-    stream : file
-    things : mapping of int to object, optional
-        What was sent apart, by number.
 
     Raises
     ------
@@ -119,7 +71,7 @@ def receive(stream: BinaryIO, things: Mapping[int, object] | None = None) -> lis
     found = []
     for count in counts:
         data, *arrays = (next(parts) for _ in range(count))
-        found.append(_Unpickler(io.BytesIO(data), things=things or {}, buffers=arrays).load())
+        found.append(pickle.loads(data, buffers=arrays))
     return found
 
 

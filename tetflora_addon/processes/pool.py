@@ -21,8 +21,7 @@ from collections.abc import Callable, Iterable, Iterator
 from contextlib import suppress
 from itertools import count
 from pathlib import Path
-from typing import Self, TypeVar
-from weakref import finalize, ref
+from typing import TypeVar
 
 from .. import parallel
 from . import child as child_module
@@ -176,71 +175,18 @@ def resume() -> None:
 
 
 class _Given:
-    """What calls share, packed when the first process asks for it.
-
-    What it holds of types that are `sent_once` goes apart and stays there as long as it is here: what such a thing has
-    computed for itself serves all later calls.
-    """
+    """What calls share, packed when the first process asks for it."""
 
     def __init__(self, thing: object) -> None:
         self.thing, self.number, self.forgotten = thing, next(_numbers), False
         self._lock, self._packed = threading.Lock(), None
 
-    def packed(self) -> tuple[Packed, list[Self]]:
-        """The bytes of the thing without some of its parts, and these, which have to be there before it."""
+    def packed(self) -> Packed:
+        """The bytes of the thing."""
         with self._lock:
             if self._packed is None:
-                self._packed = self._pack(self.thing)
+                self._packed = Packed(self.thing)
             return self._packed
-
-    @staticmethod
-    def _pack(whole: object) -> "tuple[Packed, list[_Given]]":
-        parts: list[_Given] = []
-
-        def known(thing: object) -> int | None:
-            if thing is whole or not getattr(type(thing), "sent_once", False):
-                return None
-            part = _kept(thing)
-            if part not in parts:
-                parts.append(part)
-            return part.number
-
-        return Packed(whole, known), parts
-
-
-class _Weakly(_Given):
-    """Something that is sent once, as long as it lives."""
-
-    def __init__(self, thing: object) -> None:
-        super().__init__(None)
-        self._there = ref(thing)
-        finalize(thing, self._forget).atexit = False
-
-    def _forget(self) -> None:
-        self.forgotten = True
-        _once.pop(self.number, None)
-
-    def packed(self) -> tuple[Packed, list[_Given]]:
-        """As above, but not kept, as few processes ask; several may at once."""
-        return self._pack(self._there())
-
-    def holds(self, thing: object) -> bool:
-        """Whether it is this one."""
-        return self._there() is thing
-
-
-_once: dict[int, _Weakly] = {}
-_once_lock = threading.Lock()
-
-
-def _kept(thing: object) -> _Weakly:
-    with _once_lock:
-        for one in _once.values():
-            if one.holds(thing):
-                return one
-        made = _Weakly(thing)
-        _once[made.number] = made
-        return made
 
 
 class _StartError(OSError):
@@ -301,7 +247,8 @@ class _Child:
         """
         self.forget()
         if shared.number not in self._known:
-            self._share(shared)
+            send(self._process.stdin, "share", shared.number, shared.packed())
+            self._known[shared.number] = shared
         send(self._process.stdin, "call", function, shared.number, item)
         ((*answer, self.peak),) = receive(self._process.stdout)
         return answer
@@ -317,14 +264,6 @@ class _Child:
         for number in [number for number, given in self._known.items() if given.forgotten]:
             del self._known[number]
             send(self._process.stdin, "forget", number)
-
-    def _share(self, given: _Given) -> None:
-        packed, parts = given.packed()
-        for part in parts:
-            if part.number not in self._known:
-                self._share(part)
-        send(self._process.stdin, "share", given.number, packed)
-        self._known[given.number] = given
 
     @property
     def runs(self) -> bool:

@@ -6,7 +6,6 @@ from __future__ import annotations
 
 import io
 from collections.abc import Iterator
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 
 import numpy as np
@@ -68,33 +67,6 @@ def test_an_error_is_raised_here_and_names_where_it_happened(two: None) -> None:
     with pytest.raises(ValueError, match="one") as caught:
         next(made)
     assert "in uniform" in caught.value.__notes__[0]
-
-
-def test_what_is_sent_once_takes_its_parts_along_whoever_else_asks() -> None:
-    class Whole:
-        sent_once = True
-
-        def __init__(self, part: object = None) -> None:
-            self.part = part
-
-    outer = Whole(Whole(Whole()))
-    given = pool._kept(outer)
-    kept = [pool._kept(outer.part).number]
-    with ThreadPoolExecutor(8) as threads:
-        found = [one.result() for one in [threads.submit(given._pack, _Plain(outer)) for _ in range(200)]]
-    assert all([part.number for part in parts] == [given.number] for _, parts in found)
-    first, again = (pool._Given._pack(_Nested(outer)) for _ in range(2))
-    assert [part.number for part in first[1]] == [part.number for part in again[1]] == kept
-
-
-class _Plain:
-    def __init__(self, thing: object) -> None:
-        self.thing = thing
-
-
-class _Nested:
-    def __init__(self, thing: object) -> None:
-        self.thing = thing.part
 
 
 def test_who_is_killed_is_replaced(two: None) -> None:
