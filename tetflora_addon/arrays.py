@@ -19,8 +19,6 @@ from typing import Any, Generic, Self, TypeVar
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
-from .parallel import blocks
-
 #: Arrays by what they hold. A table has one structured row for each kind of branch, see `growth.rows`.
 Floats, Floats32, Floats16 = NDArray[np.float64], NDArray[np.float32], NDArray[np.float16]
 Integers, Integers32 = NDArray[np.integer], NDArray[np.int32]
@@ -31,8 +29,6 @@ Table = NDArray[np.void]
 GOLDEN_TURN, GOLDEN_ANGLE = np.pi * (1.0 + np.sqrt(5.0)), np.pi * (3.0 - np.sqrt(5.0))
 #: Room to spare where columns of `Growing` are made larger: one part in so many of what is there.
 _SPARE = 3
-#: Indices that are looked at at a time: numpy makes 64 bit of each, which stays in the cache. Threads gain nothing.
-_BATCH = 1 << 16
 
 
 @dataclass(frozen=True)
@@ -205,18 +201,6 @@ def top(up: Integers) -> Integers:
     while (up[up] != up).any():
         up = up[up]
     return up
-
-
-def rows_within(chosen: Mask, index: Integers32) -> Integers:
-    """Rows (k,), ascending, of which an index (n,) is among those of a mask."""
-    found = [np.flatnonzero(np.take(chosen, index[block])) + block.start for block in blocks(len(index), _BATCH)]
-    return np.concatenate([np.zeros(0, np.intp), *found])
-
-
-def renumber(index: Integers32, number: Integers32) -> None:
-    """Replace an index (n,), in place, by the new numbers (m,) of what it points to."""
-    for block in blocks(len(index), _BATCH):
-        index[block] = np.take(number, index[block])
 
 
 def _joined(columns: list[Any]) -> Any:

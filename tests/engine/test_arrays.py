@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from tetflora_addon import arrays
-from tetflora_addon.arrays import Arrays, Chunks, Growing, column, nested, renumber, rows_within
+from tetflora_addon.arrays import Arrays, Chunks, Growing, column, nested
 
 
 @dataclass(frozen=True)
@@ -90,14 +90,3 @@ def test_chunks_hold_what_is_not_taken_out(steps: list, first: int, seed: int) -
         np.testing.assert_array_equal(each.joined().marks.place[:, 1], 2.0 * left)
         assert each.joined() is each.joined()
         assert each.there.all()
-
-
-@given(st.integers(0, 3 * arrays._BATCH), st.integers(1, 50), st.integers(0, 2**31))
-def test_indices_are_looked_up_as_if_all_at_once(size: int, number: int, seed: int) -> None:
-    rng = np.random.default_rng(seed)
-    index, chosen = rng.integers(0, number, size).astype(np.int32), rng.random(number) < 0.3
-    np.testing.assert_array_equal(rows_within(chosen, index), np.flatnonzero(chosen[index]))
-    new = rng.permutation(number).astype(np.int32)
-    wanted = new[index]
-    renumber(index, new)
-    np.testing.assert_array_equal(index, wanted)

@@ -30,8 +30,6 @@ from ..arrays import (
     Mask,
     column,
     nested,
-    renumber,
-    rows_within,
     spread,
 )
 from ..assets.asset import AssetTable, Instances
@@ -144,7 +142,7 @@ class SharedParts(Generic[Parts]):
 
     def branch_only(self, parts: Parts) -> Mask:
         """Parts (n,) that count apart from others, as branches without what grows on them."""
-        raise NotImplementedError
+        return np.zeros(len(parts), bool)
 
     def hold(self, parts: Parts, points: SharePoints) -> None:
         """Begin with parts and the points on them."""
@@ -193,7 +191,7 @@ class SharedParts(Generic[Parts]):
         """
         points = self._points.rows
         changed = dividing.copy()
-        inside = rows_within(dividing, points.cell)
+        inside = np.flatnonzero(dividing[points.cell])
         part = np.take(points.part, inside)
         large = np.take(self._figures.rows.reach, part) > LARGE * np.take(edge, np.take(points.cell, inside))
         # Handed on in place: millions of points that stay where they are are not looked at.
@@ -207,7 +205,7 @@ class SharedParts(Generic[Parts]):
 
     def open(self, opening: Mask, tree: TetrahedralTree | None) -> Integers32:
         """Open parts (n,); returns nodes (k,) of points that leave or come. Without a tree these stay in the root."""
-        gone = rows_within(opening, self._points.rows.part)
+        gone = np.flatnonzero(opening[self._points.rows.part])
         count, parts, points = len(self._parts), [], []
         for new, _, known in self.opened(self._parts.take_out(np.flatnonzero(opening))):
             made = self.points_on(new, known)
@@ -230,7 +228,8 @@ class SharedParts(Generic[Parts]):
         """All parts, after those that have been opened are dropped and the others numbered anew."""
         if self._parts.marked:
             there = self._parts.there
-            renumber(self._points.rows.part, (np.cumsum(there) - 1).astype(np.int32))
+            part = self._points.rows.part
+            part[:] = (np.cumsum(there) - 1).astype(np.int32)[part]
             self._figures = Growing(self._figures.rows.take(there))
         return self._parts.joined()
 
@@ -246,7 +245,7 @@ class SharedParts(Generic[Parts]):
         points, figures = self._points.rows, self._figures.rows
         cell, part, leaf, wood = points.cell, points.part, points.leaf, points.wood
         if not chosen.all():
-            some = rows_within(chosen, cell)
+            some = np.flatnonzero(chosen[cell])
             cell, part, leaf, wood = (np.take(own, some) for own in (cell, part, leaf, wood))
         fraction = (leaf + wood) / np.maximum(np.take(figures.area, part), 1e-300)
         return Totals(leaf, wood, np.take(figures.polygons, part) * fraction, np.take(figures.width, part)), cell
@@ -578,10 +577,6 @@ class SharedAssets(SharedParts[AssetParts]):
     def can_open(self, parts: AssetParts) -> Mask:
         """As `SharedParts.can_open`."""
         return self.placed.assets.clusters.children[parts.cluster] > 0
-
-    def branch_only(self, parts: AssetParts) -> Mask:
-        """None of them counts apart."""
-        return np.zeros(len(parts), bool)
 
     def opened(self, parts: AssetParts) -> Iterator[tuple[AssetParts, Integers, None]]:
         """Children of clusters, as `SharedParts.opened`."""
