@@ -92,7 +92,7 @@ def stand_leaves(identifier: str, years: int) -> tuple[NDArray[np.float64], NDAr
     """Leaf area (n,) of the plants of a grown stand as it takes light, and as it is expected of what is drawn; m²."""
     species = load_species(identifier)
     anywhere = replace(ecology_of(species), degree_days=0.0, coldest_month=-70.0, fertility=0.0, drought=5.0)
-    member = StandSpecies(species, ecology=anywhere)
+    member = StandSpecies(replace(species, ecology=anywhere))
     traits, cells = StandTraits([member]), round(SIDE / 5.0)
     site = StandSite(0.0, 0.0, SIDE / cells, np.zeros((cells, cells)))
     stand = begun(site, [member], StandSettings(density=DENSITY, recruits=0.0, years=years, interval=0))

@@ -94,7 +94,8 @@ def proxy_shells(flora: Flora, result: Refinement, light: BakedLight | None = No
     if not len(proxies):
         return None
     cells = set_apart(MediumCells.of(flora, result, result.nodes[proxies]))
-    return shell_buffers(cells, result.rank[proxies], None if light is None else light.of_shells()[proxies])
+    radiance = None if light is None else light.illumination.cell_sources(light.camera)[proxies]
+    return shell_buffers(cells, result.rank[proxies], radiance)
 
 
 def set_apart(cells: MediumCells) -> MediumCells:

@@ -137,14 +137,6 @@ class Illumination:
             result[outside] = self._from_sky(points[outside], none) + self._from_clouds(points[outside])
         return result
 
-    def irradiance(self, points: Floats, normals: Floats) -> Floats:
-        """Irradiance (m, 3) of vertices or faces of meshes, with unit normals, on the side of the normals, W/m²."""
-        cells = np.full(len(points), -1)
-        result = scattering.irradiance(self.around(points, cells), normals)
-        for toward, light in self.direct(points, cells):
-            result += light * np.maximum(np.sum(normals * toward, axis=1), 0.0)[:, None]
-        return result
-
     def facet_radiance(self, surfaces: Surfaces, camera: Camera) -> tuple[Floats32, Floats32]:
         """Outgoing radiance of the fronts and backs (m, 3) of facets or leaves, linear RGB, as a pixel shows it.
 
@@ -413,10 +405,6 @@ class BakedLight:
         toward = np.sum(facets.normal * to_eye(self.camera, facets.center), axis=1) > 0.0
         return np.where(toward[:, None], front, back)
 
-    def of_shells(self) -> NDArray:
-        """Radiance (t, 4, 3) of tetrahedra at their vertices, in the order of ``refinement.nodes``."""
-        return self.illumination.cell_sources(self.camera)
-
     def of_faces(
         self,
         positions: NDArray[np.floating],
@@ -477,7 +465,7 @@ def baked_light(
     for part in blocks(len(corners), BATCH):
         inside[part] = cell[refinement.tree.locate(_middles(corners[part].astype(np.float64)))]
     # A leaf that reaches out of all tetrahedra that hold something has no cell; it shadows like the others.
-    sheets = replace(SurfaceElements.of(corners, inside, len(clouds)), replaced=replaced)
+    sheets = SurfaceElements(corners, np.maximum(inside, 0), replaced)
     yield 0.05
     resolution, near = light_resolution(camera), None
     if len(corners):

@@ -159,15 +159,6 @@ class SurfaceElements:
         """No sheets among a number of tetrahedra."""
         return cls(np.zeros((0, 4, 3)), np.zeros(0, np.int64), np.zeros(count, bool))
 
-    @classmethod
-    def of(cls, corners: Floats, cell: Integers, count: int) -> Self:
-        """Sheets with corners (m, 4, 3) in meters, by tetrahedron (m,) out of ``count``.
-
-        They replace the clouds of tetrahedra that have some. Those with a negative ``cell`` belong to the first.
-        """
-        replaced = np.bincount(cell[cell >= 0], minlength=count) > 0
-        return cls(corners, np.maximum(cell, 0).astype(np.int64), replaced)
-
     def pixels(self, limits: tuple[int, int]) -> int:
         """Longer side of a buffer that sees all sheets, with pixels somewhat larger than a sheet."""
         if not len(self):

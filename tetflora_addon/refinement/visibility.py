@@ -71,16 +71,6 @@ class AlphaBuffer:
         Where each pixel's ray ends at an opaque polygon, as `occluder_depth` gives it for the same size.
     pixel_weight : (height · width,) float64, optional
         Pixels of the final image that each pixel stands for, where the image is not the camera's own.
-
-    Attributes
-    ----------
-    width, height : int
-        Size of the buffer, pixels.
-
-    Raises
-    ------
-    ValueError
-        If the occluders were drawn for a buffer of another size.
     """
 
     def __init__(
@@ -88,9 +78,7 @@ class AlphaBuffer:
     ) -> None:
         self.camera, self.pixel_weight = camera, pixel_weight
         self.width, self.height = buffer_size(camera, resolution)
-        self.end = None if occluders_depth is None else np.ravel(occluders_depth)
-        if self.end is not None and len(self.end) != self.width * self.height:
-            raise ValueError(f"the depth buffer of the occluders must have {self.width} × {self.height} pixels")
+        self.end = occluders_depth
         self._cell, self._pixel = np.zeros((2, 0), np.int32)
         # Optical depth that a fragment brings into its pixel, the visible fraction of its tetrahedron that it covers,
         # and the transmittance of what is before it.

@@ -44,11 +44,10 @@ class StandSite:
     plantable: NDArray | None = None
     moisture: NDArray | None = None  # (h, w): 0 dry to 1 wet; 0.5, fresh, where it is None
     fertility: NDArray | None = None  # (h, w): 0 poor to 1 rich; 0.7 where it is None
-    #: Sum of daily mean temperatures over 5 °C in a year (growing degree days), at the altitude ``altitude``.
+    #: Sum of daily mean temperatures over 5 °C in a year (growing degree days), at the height 0; it is colder above by
+    #: 0.6 K for 100 m.
     degree_days: float = 1700.0
     coldest_month: float = -1.0  # mean temperature of the coldest month there, °C
-    #: Meters at which degree days and the coldest month are known; colder above by 0.6 K for 100 m.
-    altitude: float = 0.0
 
     def __post_init__(self) -> None:
         """Refuse what is no site.
@@ -101,7 +100,7 @@ class StandSite:
 
     def suitability(self, ecology: Ecology) -> Floats:
         """How well a species grows in each cell, over how it does where nothing is wanting: (h w,), 0 to 1."""
-        colder = _LAPSE * (self.height.ravel() - self.altitude)
+        colder = _LAPSE * self.height.ravel()
         warm = self.degree_days - _DAYS * colder - ecology.degree_days
         degree_days = np.where(warm > 0, -np.expm1(-np.maximum(warm, 0.0) / _WARM), 0.0)
         degree_days = np.where(self.coldest_month - colder < ecology.coldest_month, 0.0, degree_days)
@@ -146,12 +145,6 @@ class StandSpecies:
     planted: float = 1.0  # share of what is planted, over those of the others
     #: Seeds that come from outside, over those where a tenth of the ground beyond is below its crowns.
     incoming_seeds: float = 1.0
-    ecology: Ecology | None = None  # in place of that of the species
-
-    @property
-    def needs(self) -> Ecology:
-        """Its ecology."""
-        return ecology_of(self.species) if self.ecology is None else self.ecology
 
 
 class StandTraits:
@@ -177,7 +170,7 @@ class StandTraits:
             for one in species
         ):
             raise TetFloraError("Shares of species must be 0 or greater")
-        self.needs = [one.needs for one in species]
+        self.needs = [ecology_of(one.species) for one in species]
         for name in (one for one in Ecology.__dataclass_fields__ if one != "source"):
             setattr(self, name, np.array([getattr(one, name) for one in self.needs]))
         self.planted = np.array([one.planted for one in species])

@@ -28,17 +28,7 @@ TIE = 1e-9
 
 
 def longest_edge(vertices: Floats) -> Integers:
-    """Index into `geometry.EDGES` of the longest edge; the first of those that are equally long.
-
-    Parameters
-    ----------
-    vertices : (n, 4, 3) float64
-        Tetrahedra, meters.
-
-    Returns
-    -------
-    (n,) intp
-    """
+    """Index ``(n,)`` into `geometry.EDGES` of the longest edge of tetrahedra ``(n, 4, 3)``; of several the first."""
     squared = squared_edges(vertices)
     return np.argmax(squared >= np.max(squared, axis=1, keepdims=True) * (1.0 - TIE), axis=1)
 
@@ -109,18 +99,10 @@ _CHILDREN, _PLANES = _tables()
 
 
 def best_diagonal(vertices: Floats) -> Integers:
-    """Diagonal along which the worst of the inner tetrahedra has the best quality.
+    """Diagonal ``(n,)`` of tetrahedra ``(n, 4, 3)`` along which the worst of the inner ones has the best quality.
 
-    Parameters
-    ----------
-    vertices : (n, 4, 3) float64
-        Tetrahedra, meters.
-
-    Returns
-    -------
-    (n,) intp
-        Diagonal ``k`` joins the middles of edges ``k`` and ``5 - k`` of `geometry.EDGES`; the first of those that are
-        equally good.
+    Diagonal ``k`` joins the middles of edges ``k`` and ``5 - k`` of `geometry.EDGES`; of equally good ones it is the
+    first.
 
     Notes
     -----
@@ -164,25 +146,11 @@ def divide_in_eight(vertices: Floats, diagonal: Integers | None = None) -> tuple
     return plane_through(through[..., :3, :], through[..., 3, :]), points[every, _CHILDREN[diagonal]]
 
 
-def divide_by_shape(vertices: Floats) -> tuple[Floats, Floats, Mask]:
-    """Divide tetrahedra into eight in the way that keeps them in better shape, so that no slivers arise.
+def divide_by_shape(vertices: Floats) -> tuple[Floats, Floats]:
+    """Divide tetrahedra ``(n, 4, 3)`` into eight in the way that keeps them in better shape, so that no slivers arise.
 
-    Both ways give eight of equal volume, three planes deep. Worst qualities are compared, with a `HANDICAP` on the
-    bisection of compact tetrahedra.
-
-    Parameters
-    ----------
-    vertices : (n, 4, 3) float64
-        Positively oriented tetrahedra, meters.
-
-    Returns
-    -------
-    planes : (n, 7, 4) float64
-        In the order of a heap, see `divide_in_eight`.
-    children : (n, 8, 4, 3) float64
-        Positively oriented, of equal volume.
-    eight : (n,) bool
-        Which were divided into the canonical eight; the others were bisected three times along their longest edges.
+    Planes and children are as of `divide_in_eight`: those of it, or of `bisect_thrice`. Worst qualities are compared,
+    with a `HANDICAP` on the bisection of compact tetrahedra.
 
     Notes
     -----
@@ -192,10 +160,9 @@ def divide_by_shape(vertices: Floats) -> tuple[Floats, Floats, Mask]:
     """
     (planes, children), (other, halves) = divide_in_eight(vertices), bisect_thrice(vertices)
     handicap = np.where(quality(vertices) > COMPACT, HANDICAP, 1.0 + TIE)
-    chosen = handicap * np.min(quality(children), axis=1) >= np.min(quality(halves), axis=1)
-    bisected = ~chosen
+    bisected = handicap * np.min(quality(children), axis=1) < np.min(quality(halves), axis=1)
     planes[bisected], children[bisected] = other[bisected], halves[bisected]
-    return planes, children, chosen
+    return planes, children
 
 
 def bisect_thrice(vertices: Floats) -> tuple[Floats, Floats]:
@@ -218,15 +185,9 @@ class TetrahedralTree:
     Node 0 is the root. Inner nodes near it may be convex regions without a tetrahedron; terminal nodes are tetrahedra
     once `split` is used (`tetflora_addon.tetrahedra.roots` sees to that). Between a tetrahedron and those that
     `split_by_shape` makes of it there may be such regions too.
-
-    Parameters
-    ----------
-    vertices : (4, 3) float64, optional
-        Tetrahedron of the root, positively oriented, meters. Without it the root is a region to be divided by
-        `divide`.
     """
 
-    def __init__(self, vertices: ArrayLike | None = None) -> None:
+    def __init__(self) -> None:
         self._size = 0
         self._made = 0
         self._rows = {
@@ -239,8 +200,6 @@ class TetrahedralTree:
         }
         self._inner_by_level: tuple[int, list[Integers]] = (-1, [])
         self._append(np.full(1, -1, np.int32), np.zeros(1, np.int16), np.zeros(1, np.bool_))
-        if vertices is not None:
-            self.place(np.zeros(1, np.intp), np.asarray(vertices, np.float64)[None])
 
     def __len__(self) -> int:
         return self._size
@@ -319,23 +278,11 @@ class TetrahedralTree:
     def split_by_shape(self, nodes: ArrayLike) -> Integers32:
         """Divide terminal tetrahedra into eight as suits their shape: the canonical eight, or three bisections.
 
-        Parameters
-        ----------
-        nodes : (n,) int
-            Terminal nodes with a tetrahedron, each once.
-
-        Returns
-        -------
-        (n, 8) int32
-            Terminals three levels further down, see `tree.divide_by_shape`; they inherit `inside`.
-
-        Raises
-        ------
-        ValueError
-            If a node is not terminal, has no tetrahedron, or occurs twice.
+        What is given and refused is as of `split`. Returned are terminals three levels further down, (n, 8) int32, see
+        `tree.divide_by_shape`; they inherit `inside`.
         """
         nodes = np.asarray(nodes, np.intp)
-        planes, pieces, _ = divide_by_shape(self._tetrahedra(nodes))
+        planes, pieces = divide_by_shape(self._tetrahedra(nodes))
         for first, end in ((0, 1), (1, 3), (3, 7)):  # planes are in the order of a heap
             nodes = self.divide(nodes, planes[:, first:end].reshape(-1, 4)).reshape(-1)
         self.place(nodes, pieces.reshape(-1, 4, 3))
@@ -397,7 +344,7 @@ class TetrahedralTree:
         eye : (3,) float64, optional
             Where rays start, meters, world space.
         direction : (3,) float64, optional
-            Common direction of parallel rays; used if ``eye`` is None.
+            Common direction of parallel rays; needed if ``eye`` is None.
         back_to_front : bool
             Rank from the farthest terminal instead, as the paper draws its final image.
 
@@ -406,13 +353,7 @@ class TetrahedralTree:
         (len,) int32
             0 for the nearest terminal (the farthest if ``back_to_front``) and so on; −1 for inner nodes.
 
-        Raises
-        ------
-        ValueError
-            If neither an eye nor a direction is given.
         """
-        if eye is None and direction is None:
-            raise ValueError("a visibility order requires an eye or a direction")
         children, inner = self.children, self._levels_of_inner()
         count = np.ones(self._size, np.int32)
         for nodes in reversed(inner):
@@ -433,17 +374,9 @@ class TetrahedralTree:
         return place
 
     def locate(self, points: ArrayLike) -> Integers32:
-        """Terminal that holds each point; points outside the root go to the one on their side of all planes.
+        """Terminal ``(n,)`` int32 that holds each point ``(n, 3)``, meters, world space; one on a plane is on side 1.
 
-        Parameters
-        ----------
-        points : (n, 3) float64
-            Meters, world space.
-
-        Returns
-        -------
-        (n,) int32
-            Node numbers. A point on a plane belongs to side 1.
+        Points outside the root go to the terminal on their side of all planes.
         """
         points = np.asarray(points, np.float64).reshape(-1, 3)
         found = np.zeros(len(points), np.int32)

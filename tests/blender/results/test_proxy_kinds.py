@@ -40,7 +40,7 @@ def triangles(refined, light=None, _first_sheet=0):
     index = np.arange(len(corners), dtype=np.int32)
     attributes = {"tf_transmission": ('FACE', np.zeros(len(corners) // 3, np.float32))}
     if light is not None:
-        mean = light.of_shells()[proxies].mean(axis=1)
+        mean = light.illumination.cell_sources(light.camera)[proxies].mean(axis=1)
         attributes |= baked_attributes('FACE', mean)
     following = np.where(index % 3 == 2, index - 2, index + 1).astype(np.int32)
     yield MeshBuffers(

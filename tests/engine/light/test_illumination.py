@@ -36,6 +36,7 @@ from tetflora_addon.tetrahedra.geometry import signed_volume
 DARK = World.plain((0, 0, 0))
 DOWN = np.array([0.0, 0.0, -1.0])
 SUN = Light("SUN", np.zeros(3), DOWN, color=np.array([3.0, 2.0, 1.0]))
+NONE = np.array([-1])  # no tetrahedron
 # Kuhn's division of a cube.
 _KUHN = [(1, 3, 7), (1, 5, 7), (2, 3, 7), (2, 6, 7), (4, 5, 7), (4, 6, 7)]
 
@@ -282,7 +283,7 @@ def test_ground_lights_from_below() -> None:
     down = np.array([[0.0, 0.0, -1.0]])
     at = np.array([[0.0, 0.0, -3.9]])
     dark, bright = (
-        shadow_pass(box(0.01), [SUN], DARK, plate, resolution=128, ground=(c,) * 3).irradiance(at, down)
+        irradiance(shadow_pass(box(0.01), [SUN], DARK, plate, resolution=128, ground=(c,) * 3).around(at, NONE), down)
         for c in (0.0, 0.5)
     )
     assert dark == pytest.approx(0.0, abs=0.01)
@@ -304,7 +305,8 @@ def test_nothing_to_light() -> None:
     """No tetrahedra, and points beside them."""
     found = shadow_pass(clouds(np.zeros((0, 4, 3)), 1.0, 0.5, 0.0), [SUN], World.plain((1, 1, 1)))
     up = np.array([[0.0, 0.0, 1.0]])
-    assert found.irradiance(np.zeros((1, 3)), up) == pytest.approx(SUN.color[None] + np.pi, rel=1e-3)
+    assert irradiance(found.around(np.zeros((1, 3)), NONE), up) == pytest.approx(np.full((1, 3), np.pi), rel=1e-3)
+    assert [light.tolist() for _, light in found.direct(np.zeros((1, 3)), NONE)] == [[SUN.color.tolist()]]
     assert found.cell_sources(support.camera((9, 0, 2), (0, 0, -2))).shape == (0, 4, 3)
 
 
@@ -329,10 +331,15 @@ def counted_points(monkeypatch: pytest.MonkeyPatch) -> list[int]:
     return held
 
 
+def sheets_in(corners: np.ndarray, cell: np.ndarray, count: int) -> SurfaceElements:
+    """Sheets that cast the shadows of the tetrahedra which have some."""
+    return SurfaceElements(corners, cell, np.bincount(cell, minlength=count) > 0)
+
+
 def test_sheets_shadow_those_below_and_not_themselves() -> None:
     """As rays find it: a sheet is lit as far as none lies above its middle."""
     corners, cell = random_sheets(9, 120, 0.4)
-    sheets = SurfaceElements.of(corners, cell, 6)
+    sheets = sheets_in(corners, cell, 6)
     found = shadow_pass(box(5.0, 1), [SUN], DARK, resolution=128, sheets=sheets)
     middle, every = corners.mean(axis=1), np.arange(120)
     light = next(found.direct(middle, cell, every))[1][:, 0] / 3.0
@@ -349,7 +356,7 @@ def test_however_many_sheets_are_drawn_few_points_are_held_at_once(monkeypatch: 
     """Small ones and large ones, which are cut into many parts; the light is the same to the last digit."""
     parts = [random_sheets(seed, 60, side) for seed, side in ((1, 0.01), (2, 0.1), (3, 0.6))]
     corners, cell = (np.concatenate(arrays) for arrays in zip(*parts, strict=True))
-    sheets = SurfaceElements.of(corners, cell, 6)
+    sheets = sheets_in(corners, cell, 6)
 
     def light() -> np.ndarray:
         found = shadow_pass(box(5.0, 1), [SUN], DARK, resolution=128, sheets=sheets)
@@ -385,7 +392,7 @@ def test_what_a_view_of_a_lamp_does_not_show_costs_it_nothing(monkeypatch: pytes
     corners, cell = random_sheets(11, 200, 0.01)
     held = counted_points(monkeypatch)
     lamp = Light("POINT", np.array([0.1, 0.2, -2.0]), DOWN)
-    made = buffers_of(lamp, box(1.0, 1), SurfaceElements.of(corners, cell, 6), None, 128)
+    made = buffers_of(lamp, box(1.0, 1), sheets_in(corners, cell, 6), None, 128)
     assert len(made) == 6
     assert sum(held) < 6 * 200
 
@@ -393,7 +400,7 @@ def test_what_a_view_of_a_lamp_does_not_show_costs_it_nothing(monkeypatch: pytes
 def test_samples_stand_for_their_key_points() -> None:
     corners, cell = random_sheets(10, 40, 0.2)
     cloud = box(1.0, 1)
-    points, cells, sheets, keys = SurfaceElements.of(corners, np.where(cell == 2, 3, cell), 6).samples(cloud)
+    points, cells, sheets, keys = sheets_in(corners, np.where(cell == 2, 3, cell), 6).samples(cloud)
     assert (sheets[cells == 2] == -1).all()
     assert len(points[cells == 2]) == 4
     assert keys.means(np.ones((len(points), 2))) == pytest.approx(1.0)
@@ -408,7 +415,7 @@ def test_fewer_sheets_have_the_area_of_all(seed, count, most):
     rng = np.random.default_rng(seed)
     corners = rng.normal(size=(count, 1, 3)) + rng.normal(scale=0.1, size=(1, 4, 3))
     cells = rng.integers(0, 5, count)
-    fewer, number = SurfaceElements.of(corners, cells, 5).thinned(most)
+    fewer, number = sheets_in(corners, cells, 5).thinned(most)
     assert len(fewer) <= max(most, 1)
     assert sorted(number[number >= 0]) == list(range(len(fewer)))
     if len(fewer):

@@ -261,8 +261,9 @@ def test_colors_tell_tetrahedra_apart(gathered: levels.Levels) -> None:
 
 
 def test_a_tree_that_was_not_divided_has_an_order() -> None:
-    vertices = tetrahedra(1, 20)[0]
-    gathered = levels.Levels([], TetrahedralTree(vertices), PERSP)
+    tree = TetrahedralTree()
+    tree.place([0], tetrahedra(1, 20)[:1])
+    gathered = levels.Levels([], tree, PERSP)
     assert gathered.nbytes > 0
 
 

@@ -14,6 +14,7 @@ from tetflora_addon.compiled.flora import compile_species
 from tetflora_addon.errors import SpeciesError
 from tetflora_addon.species.ages import ages_of
 from tetflora_addon.species.catalog import load_species, species_from_dict
+from tetflora_addon.species.ecology import ecology_of
 from tetflora_addon.species.species import Ecology
 from tetflora_addon.stands.site import StandSpecies, StandTraits
 
@@ -35,14 +36,14 @@ def test_mistakes_are_named(ecology: object, words: str) -> None:
 
 def test_a_file_may_say_some_of_it() -> None:
     species = species_from_dict(support.small(ecology={"shade": 1, "crown_width": [1, 20]}), "small", "small.json")
-    assert species.ecology == Ecology(shade=1.0, crown_width=(1.0, 20.0)) == StandSpecies(species).needs
+    assert species.ecology == Ecology(shade=1.0, crown_width=(1.0, 20.0)) == ecology_of(species)
     assert species_from_dict(support.small(), "small", "small.json").ecology is None
 
 
 @pytest.mark.parametrize("name", support.SPECIES)
 def test_every_species_can_grow_in_a_stand(name: str) -> None:
     species = load_species(name)
-    needs, traits = StandSpecies(species).needs, StandTraits([StandSpecies(species)])
+    needs, traits = ecology_of(species), StandTraits([StandSpecies(species)])
     basal = np.linspace(0.0, 1.2 * needs.diameter, 200)
     zero = np.zeros(200, np.int64)
     heights, radii = traits.heights(zero, basal), traits.radii(zero, basal)
@@ -57,9 +58,9 @@ def test_every_species_can_grow_in_a_stand(name: str) -> None:
 def test_what_is_not_described_follows_from_one_lifespan(name: str) -> None:
     """A trunk thickens in a stand within the years after which the same plant, as it grows by its age, dies."""
     plain = replace(load_species(name), ages=None, ecology=None)
-    ages, needs = ages_of(plain), StandSpecies(plain).needs
-    assert StandSpecies(replace(plain, ages=ages)).needs == needs
-    longer = StandSpecies(replace(plain, ages=replace(ages, lifespan=20.0 * ages.lifespan))).needs
+    ages, needs = ages_of(plain), ecology_of(plain)
+    assert ecology_of(replace(plain, ages=ages)) == needs
+    longer = ecology_of(replace(plain, ages=replace(ages, lifespan=20.0 * ages.lifespan)))
     for one, lifespan in ((needs, ages.lifespan), (longer, 20.0 * ages.lifespan)):
         years = one.diameter / one.diameter_increment
         assert years == pytest.approx(0.35 * lifespan) or (one.diameter_increment == 0.02 and years > 0.35 * lifespan)

@@ -11,6 +11,7 @@ import pytest
 from numpy.typing import NDArray
 
 from tetflora_addon.species.catalog import load_species
+from tetflora_addon.species.ecology import ecology_of
 from tetflora_addon.stands.grow import Plants, SeedDispersal, planted
 from tetflora_addon.stands.site import StandSite, StandSpecies, StandTraits
 
@@ -23,7 +24,7 @@ def fallen(
 ) -> tuple[SeedDispersal, NDArray[np.float64]]:
     """Seeds on a square meter (rows, columns) around one beech at fractions of the ground, by itself in the middle."""
     beech = load_species("beech")
-    traits = StandTraits([StandSpecies(beech, ecology=replace(StandSpecies(beech).needs, dispersal=dispersal))])
+    traits = StandTraits([StandSpecies(replace(beech, ecology=replace(ecology_of(beech), dispersal=dispersal)))])
     site, suitability = StandSite(0.0, 0.0, SIDE / 120, np.zeros((120, 120))), np.ones((1, 120**2))
     plants: Plants = planted(site, traits, suitability, 1.0, 0).take(np.array([0]))
     one = replace(
