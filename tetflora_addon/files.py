@@ -42,13 +42,7 @@ def is_identifier(text: str) -> bool:
 
 
 def path_in(folder: Path, name: str) -> Path:
-    """The path of a file right in a folder.
-
-    Raises
-    ------
-    OSError
-        The name leads anywhere else.
-    """
+    """The path of a file right in a folder; a name that leads anywhere else is an `OSError`."""
     path = folder / name
     _refuse_nul(path)
     alone = name not in ("", ".", "..") and not set(name) & set("/\\:")
@@ -66,12 +60,7 @@ def is_regular(path: Path) -> bool:
 
 
 def read_whole(path: Path, most: int) -> bytes:
-    """The content of a regular file.
-
-    Parameters
-    ----------
-    most : int
-        Bytes; a larger file is not read.
+    """The content of a regular file of at most so many bytes.
 
     Raises
     ------
@@ -96,13 +85,8 @@ def read_whole(path: Path, most: int) -> bytes:
 def write_whole(path: Path, content: bytes | str) -> None:
     """Write a file beside its place and then put it there; text becomes UTF-8.
 
-    Readers in other processes see the old file or the new one, never a part of either. A link is replaced, and what it
-    leads to stays as it is.
-
-    Raises
-    ------
-    OSError
-        It cannot be written; an earlier file stays as it was.
+    Readers in other processes see the old file or the new one, never a part of either; it is the old one if something
+    goes wrong. A link is replaced, and what it leads to stays as it is.
     """
     _refuse_nul(path)
     part = path.with_name(uuid.uuid4().hex.join(PART))
@@ -119,13 +103,7 @@ def write_whole(path: Path, content: bytes | str) -> None:
 
 
 def replace(part: Path, path: Path) -> None:
-    """Put a file in the place of another one; on Windows wait a moment for whoever has that open, as virus scanners do.
-
-    Raises
-    ------
-    OSError
-        It cannot be put there.
-    """
+    """Put a file in the place of another; on Windows wait a moment for whoever has that open, as virus scanners do."""
     for wait in (*_WAITS, None):
         try:
             part.replace(path)

@@ -153,11 +153,8 @@ def read_arrays(path: Path, most: int, checked: Callable[[Mapping[str, NDArray]]
 
 
 def refuse_packed(content: bytes, most: int) -> None:
-    """Refuse an archive that would take more memory than it has bytes: ours are not compressed, and say their size.
-
-    Raises
-    ------
-    ValueError
+    """Refuse by a ValueError an archive that would take more memory than it has bytes: ours are not compressed, and say
+    their size.
     """
     with zipfile.ZipFile(io.BytesIO(content)) as archive:
         for info in archive.infolist():

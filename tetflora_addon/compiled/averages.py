@@ -351,16 +351,7 @@ def _over(own: Floats, plain: Floats) -> Floats:
 
 
 def shaped_totals(rows: Table, totals: Averages, polygons: Floats) -> ShapedTotals:
-    """Totals of all rows.
-
-    Parameters
-    ----------
-    rows : (r,) parameter table
-    totals : Averages
-        Of plants as described.
-    polygons : (r,) float64
-        Faces of a leaf of each row.
-    """
+    """Totals of all rows (r,), from those of plants as described, and faces (r,) of a leaf of each row."""
     every = np.arange(len(rows))
     bearing = (rows["next"][:, (LATERAL, DEAD, FORK)] >= 0).any(axis=1)
     solid = rows["phantom"] | rows["drawn"] | (rows["envelope"] > 0)
@@ -569,15 +560,8 @@ def _mixed(summer: Floats, area: Floats, left: list[Floats], year: Table, hue: F
 def totals_of_day(
     rows: Table, species: Sequence[Species], season: seasons.Season, totals: Averages, leaf: RowLeaves
 ) -> tuple[Table, DayTotals] | None:
-    """Rows on a day, and totals of their sub-plants; None where no plant is other than in summer.
-
-    Parameters
-    ----------
-    rows : (r,) parameter table
-    totals : Averages
-        Of the same rows.
-    leaf : RowLeaves
-        Likewise.
+    """Rows on a day, and totals of their sub-plants, from rows (r,), totals and leaves in summer; None where no plant
+    is other than in summer.
     """
     if all(one.year is None for one in species):
         return None

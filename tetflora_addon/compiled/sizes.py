@@ -235,12 +235,8 @@ _reaches: "WeakKeyDictionary[Flora, dict[int, TwigReach]]" = WeakKeyDictionary()
 
 
 def measured(flora: Flora, seeds: Seeds) -> tuple[Floats, Floats]:
-    """Heights of plants, to the highest leaf or wood, and means of the extents of their crowns to east and north.
-
-    Returns
-    -------
-    height, width : (n,) float64
-        Meters, about as plants are when all of them has grown.
+    """Heights (n,) of plants, to the highest leaf or wood, and means (n,) of the extents of their crowns to east and
+    north, meters, about as plants are when all of them has grown.
     """
     height, width = np.zeros((2, len(seeds)))
 

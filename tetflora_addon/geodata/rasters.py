@@ -106,15 +106,7 @@ def upright(dx: float, dy: float) -> tuple[Floats, Floats]:
 
 
 def check_regular(path: Path) -> None:
-    """Refuse folders, links, pipes and devices.
-
-    Raises
-    ------
-    OSError
-        There is nothing, or it cannot be looked at.
-    SceneError
-        It is one of these.
-    """
+    """Refuse folders, links, pipes and devices by a `SceneError`; it is an OSError where nothing can be looked at."""
     if not is_regular(path):
         with suppress(ValueError):  # a zero in its name
             path.lstat()

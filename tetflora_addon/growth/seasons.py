@@ -155,13 +155,8 @@ def _numbers(leaf: LeafYear) -> np.void:
 
 
 def plant_years(rows: Table, row: Integers, key: Keys) -> Floats | None:
-    """The day that it is for plants (n, 2), and where they stand among autumn colors, 0 to 1; None without seasons.
-
-    Parameters
-    ----------
-    row : (n,) int
-        Of their trunks.
-    key : (n,) uint64
+    """The day that it is for plants, by rows of their trunks (n,) and keys (n,), and where they stand among autumn
+    colors, 0 to 1: (n, 2); None without seasons.
     """
     if not is_seasonal(rows):
         return None

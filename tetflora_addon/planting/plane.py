@@ -261,14 +261,8 @@ _BARE, _FULL = -0.1, 0.25  # values of the noise below which nothing grows, and 
 
 
 def gradient_noise(points: Floats, key: Keys) -> Floats:
-    """Smooth noise with mean 0 between -1 and 1 (K. Perlin, "Improving noise", SIGGRAPH 2002, in two dimensions).
-
-    Parameters
-    ----------
-    points : (n, 2) float64
-        In cells of the lattice.
-    key : uint64
-        Of the whole lattice.
+    """Smooth noise (n,) with mean 0 between -1 and 1 at points (n, 2) in cells of a lattice, which has a key (K.
+    Perlin, "Improving noise", SIGGRAPH 2002, in two dimensions).
     """
     corner = np.floor(points)
     part = points - corner

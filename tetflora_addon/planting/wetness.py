@@ -69,14 +69,7 @@ def cell_for(triangles: Floats, finest: float, most: int) -> float:
 
 
 def height_grid(triangles: Floats, cell: float) -> HeightGrid:
-    """Heights of the highest of all triangles.
-
-    Parameters
-    ----------
-    triangles : (t, 3, 3) float64
-        Corners, meters in world space; walls, which have no area on the map, do not count.
-    cell : float
-        Meters.
+    """Heights of the highest of triangles (t, 3, 3) in cells of a width, meters, world space; walls do not count.
 
     Raises
     ------

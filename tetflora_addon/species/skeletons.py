@@ -58,16 +58,8 @@ class Chains:
 
 
 def bezier_chains(control: Chains, left: Floats, right: Floats, steps: Integers) -> Chains:
-    """Cubic Bezier splines; radii run evenly from one control point to the next.
-
-    Parameters
-    ----------
-    control : Chains
-        Control points.
-    left, right : (p, 3) float64
-        Handles before and after each control point.
-    steps : (s,) int
-        Pieces between two control points of each spline, 1 or more; 1 gives straight lines.
+    """Cubic Bezier splines of control points with handles (p, 3) before and after each, in so many pieces (s,) between
+    two of them; 1 gives straight lines. Radii run evenly from one control point to the next.
     """
     counts = np.diff(control.first)
     owner = np.repeat(np.arange(len(counts)), counts)

@@ -246,21 +246,14 @@ SMALLEST = 1.0
 
 
 def world_cubes(bounds: ArrayLike) -> tuple[float, Integers, Integers]:
-    """Cubes around a scene, at most two along each axis.
-
-    Parameters
-    ----------
-    bounds : (2, 3) float64
-        Lowest and highest corner of what is in the scene, meters.
+    """Cubes around what is in a box, (2, 3), meters; at most two along each axis.
 
     Returns
     -------
     side : float
         Meters, a power of two.
-    low : (3,) int64
-        Lowest corner, in sides.
-    number : (3,) int64
-        Cubes along each axis, 1 or 2.
+    low, number : (3,) int64
+        Lowest corner, in sides, and cubes along each axis, 1 or 2.
 
     Raises
     ------
