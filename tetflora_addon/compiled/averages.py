@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 
 from ..arrays import Floats, Integers, Mask, Table, gathered
 from ..growth import crown_effects, seasons
-from ..growth.axes import profile, profile_integral
+from ..growth.axes import profile
 from ..growth.foliage import YOUTH
 from ..growth.rows import DEAD, FORK, LATERAL, NOW, SPUR, fullness_of, lengths, living, spread_children
 from ..growth.seeds import BASE, LEAVES, MOST, WIDTH, Branches
@@ -165,7 +165,7 @@ def average(rows: Table, leaf: RowLeaves) -> Averages:
         leaf_color[:, n] = one_area[:, None] * (
             area[:, None] * inside + area_outward[:, None] * (tip - inside) + area_young[:, None] * (young - inside)
         )
-    whole = profile_integral(exact, every, no_key, np.ones(r))
+    whole = profile(exact, every, no_key, np.ones(r), summed=True)
     real = ~rows["phantom"]
     fixed_wood = eye * (tube_perimeter(np.maximum(rows["sides"], 3)) * whole * real)
     fixed_faces = eye * (rows["sides"] * (rows["segments"] + rows["rings"]) * real)

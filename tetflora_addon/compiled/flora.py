@@ -211,7 +211,11 @@ class Flora:
 
     def face_counts(self, subplants: Branches) -> Floats:
         """Expected number (n,) of the faces of sub-plants, leaves and branches."""
-        return self.branch_faces(subplants) + fullness(self.rows, subplants) * self._leaf_faces(subplants)
+        if subplants.year is None:
+            leaves = self.leaf_faces[subplants.row] * self._shaped_leaves(subplants, faces=True)
+        else:
+            leaves = self.day.leaf_faces(subplants, self._shaped_leaves(subplants, faces=True, kinds=True))
+        return self.branch_faces(subplants) + fullness(self.rows, subplants) * leaves
 
     def branch_faces(self, subplants: Branches) -> Floats:
         """Expected number (n,) of the faces of the branches of sub-plants."""
@@ -221,12 +225,6 @@ class Flora:
         if len(some):
             counts[some] += (self.shaped_totals.faces(subplants.take(some)) - 1.0) * wood[some]
         return counts
-
-    def _leaf_faces(self, subplants: Branches) -> Floats:
-        """Expected number (n,) of the faces of the leaves of sub-plants, without their fullness."""
-        if subplants.year is not None:
-            return self.day.leaf_faces(subplants, self._shaped_leaves(subplants, faces=True, kinds=True))
-        return self.leaf_faces[subplants.row] * self._shaped_leaves(subplants, faces=True)
 
     @_in_summer
     def shaped_totals(self) -> ShapedTotals:
@@ -262,12 +260,8 @@ class Flora:
 
 
 def compile_species(species: Sequence[Species]) -> Flora:
-    """Compile the species of a scene; the last few results are kept, by content.
-
-    Raises
-    ------
-    SpeciesError
-        A species whose leaf is still the name of a Blender object (the bridge to Blender has to replace it first).
+    """Compile the species of a scene; the last few results are kept, by content. It is a `SpeciesError` if a leaf is
+    still the name of a Blender object, which the bridge to Blender has to replace first.
     """
     return _compiled(tuple(with_quality(with_habit(one, one.habit), one.quality) for one in species))
 

@@ -116,12 +116,8 @@ def known_crown(species: Species) -> Crown | None:
 
 
 def crown_of(species: Species) -> Crown:
-    """The mean crown of a species; its samples are drawn at the first time, which takes some tenths of a second.
-
-    Raises
-    ------
-    SpeciesError
-        A leaf is still the name of a Blender object.
+    """The mean crown of a species, which at the first time takes some tenths of a second; a `SpeciesError` if a leaf is
+    still the name of a Blender object.
     """
     found = _known.get(species)
     if found is None:

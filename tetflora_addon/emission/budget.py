@@ -92,8 +92,6 @@ def fit_to_budget(
     ----------
     result : Refinement
         Of the loop.
-    camera : Camera
-    settings : RefinementSettings
     faces : float, optional
         Faces of each proxy tetrahedron; by default proxies are facets or spheres, whose number follows their size.
     times : float
@@ -277,9 +275,6 @@ def estimate(
 
     Parameters
     ----------
-    stand : Stand
-    camera : Camera
-    settings : RefinementSettings
     used : float
         Bytes that are taken already, and that the renderer will need for its picture.
     allowed : float

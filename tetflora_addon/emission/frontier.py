@@ -224,8 +224,6 @@ class Frontier:
 
     Parameters
     ----------
-    kinds : sequence of FrontierKind
-    coverage : Coverage
     facet : float
         Side of facets, pixels; it and the kinds may change on the way to what is coarser.
 

@@ -17,12 +17,8 @@ from .forest import Forest
 
 
 def write_obj(path: Path, forest: Forest) -> Iterator[float]:
-    """Write a file, its materials (``.mtl``) and a table of plants (``.csv``); yields how much of it is done.
-
-    Raises
-    ------
-    OSError
-        One of them cannot be written.
+    """Write a file, its materials (``.mtl``) and a table of plants (``.csv``), or raise an OSError; yields how much of
+    it is done.
     """
     lines = []
     for surface in forest.surfaces:

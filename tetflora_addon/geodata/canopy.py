@@ -47,12 +47,8 @@ class Trees:
 
 
 def heights_above(surface: Raster, ground: Raster, what: str) -> Raster:
-    """Heights of a surface above the ground, where both are known: a canopy of two elevation models.
-
-    Raises
-    ------
-    SceneError
-        Nobody can tell where one lies on the other; ``what`` begins the message.
+    """Heights of a surface above the ground, where both are known: a canopy of two elevation models. It is a
+    `SceneError` if nobody can tell where one lies on the other.
     """
     if (surface.system.epsg == 0) != (ground.system.epsg == 0):
         raise SceneError(f"{what}the coordinate system of one of the two rasters is not known; set Coordinate System")
@@ -71,12 +67,8 @@ def heights_above(surface: Raster, ground: Raster, what: str) -> Raster:
 
 
 def checked_canopy(values: Floats32, what: str) -> tuple[Floats32, list[str]]:
-    """Canopy heights without what no tree can be, and what is to be told of them.
-
-    Raises
-    ------
-    SceneError
-        They are elevations, or in another unit; ``what`` begins the message.
+    """Canopy heights without what no tree can be, and what is to be told of them; a `SceneError` if they are
+    elevations, or in another unit.
     """
     known = values[np.isfinite(values)]
     low, high = np.percentile(known, (1.0, 99.0)).tolist()

@@ -171,12 +171,8 @@ def _usgs(path: Path) -> Raster:
 
 
 def mosaic(tiles: Sequence[Raster], names: Sequence[str]) -> Raster:
-    """Several tiles as one raster; where they overlap, the last that has a value counts.
-
-    Raises
-    ------
-    SceneError
-        They are no tiles of one grid; names the first that is not.
+    """Several tiles as one raster; where they overlap, the last that has a value counts. The first that is no tile of
+    one grid with the others is a `SceneError`.
     """
     first = tiles[0]
     if len(tiles) == 1:

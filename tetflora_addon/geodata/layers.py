@@ -91,12 +91,8 @@ def read_features(path: Path, chosen: int = 0) -> tuple[list[_Feature], System]:
 
 
 def parts_of(geometry: _Feature | None, where: str) -> Iterator[tuple[str, Any]]:
-    """Points, lines and areas of a geometry: type and coordinates of each, as GeoJSON has them.
-
-    Raises
-    ------
-    SceneError
-        It is no geometry of GeoJSON; ``where`` begins the message.
+    """Points, lines and areas of a geometry: type and coordinates of each, as GeoJSON has them; a `SceneError` if it is
+    no geometry of GeoJSON.
     """
     kind = geometry["type"] if geometry else "Point"
     parts = [geometry] if geometry else []
@@ -115,13 +111,7 @@ def parts_of(geometry: _Feature | None, where: str) -> Iterator[tuple[str, Any]]
 
 
 def list_of(value: Any, where: str) -> list[Any]:
-    """Coordinates that are a list.
-
-    Raises
-    ------
-    SceneError
-        They are none; ``where`` begins the message.
-    """
+    """Coordinates that are a list; a `SceneError` if they are none."""
     if not isinstance(value, list):
         raise SceneError(f"{where}: its coordinates are {quoted(value)}, not a list; correct them")
     return value

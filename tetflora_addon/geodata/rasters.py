@@ -114,12 +114,8 @@ def check_regular(path: Path) -> None:
 
 
 def in_degrees(raster: Raster, what: str) -> Raster:
-    """A raster of which no file tells the system; its cells may be so small that they are degrees.
-
-    Raises
-    ------
-    SceneError
-        Nobody can tell; ``what`` begins the message.
+    """A raster of which no file tells the system; its cells may be so small that they are degrees, and it is a
+    `SceneError` if nobody can tell.
     """
     if raster.system != System() or not may_be_degrees(raster.outline):
         return raster
@@ -138,13 +134,7 @@ _DEGREES, _UNCLEAR = 0.003, 0.1  # cells: no ground is as fine in meters, or as 
 
 
 def checked_size(width: int, height: int, what: str) -> None:
-    """Refuse rasters that are too large, or have no cells.
-
-    Raises
-    ------
-    SceneError
-        ``what`` begins the message.
-    """
+    """Refuse rasters that are too large, or have no cells, by a `SceneError`."""
     if min(width, height) < 2 or max(width, height) > MAX_SIDE or width * height > MAX_CELLS:
         raise SceneError(
             f"{what}{width:,} by {height:,} cells; from 2 by 2 to {MAX_CELLS:,} in all can be read. Crop it, or "

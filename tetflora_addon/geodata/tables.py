@@ -177,12 +177,8 @@ def flat_tags(properties: dict[str, Any]) -> dict[str, Any]:
 
 
 def coordinates(values: Any, where: str, texts: bool = False) -> Floats:
-    """Positions of GeoJSON as (n, 2); heights do not count, and numbers may be texts if asked for.
-
-    Raises
-    ------
-    SceneError
-        They are no positions; ``where`` begins the message.
+    """Positions of GeoJSON as (n, 2), or a `SceneError` if they are none; heights do not count, and numbers may be
+    texts if asked for.
     """
     try:
         points = np.array([(x, y) for x, y, *_ in values], np.float64).reshape(-1, 2)
@@ -359,13 +355,7 @@ def _positions(values: object) -> list[list[float]]:
 
 
 def middle_of(points: Sequence[Sequence[float]]) -> tuple[float, float]:
-    """The centroid of a ring (n, 2), or the mean of less than three points.
-
-    Raises
-    ------
-    ValueError
-        They are no points.
-    """
+    """The centroid of a ring (n, 2), or the mean of less than three points; a ValueError if they are none."""
     ring = np.array([(x, y) for x, y, *_ in points], np.float64).reshape(-1, 2)
     if not np.isfinite(ring).all() or not len(ring):
         raise ValueError

@@ -198,17 +198,11 @@ FLARE_END = 1 / 8
 _FALL = 8 * np.log(100.0)  # the flare falls to a hundredth over the first eighth
 
 
-def profile(rows: Table, row: NDArray, key: Keys, t: Floats) -> NDArray:
-    """Radius (n,) at fractions t (n,) of branches of rows (n,) and keys (n,), divided by that of the base unflared."""
-    return _profile(rows, row, key, t, summed=False)
+def profile(rows: Table, row: NDArray, key: Keys, t: Floats, summed: bool = False) -> NDArray:
+    """Radius (n,) at fractions t (n,) of branches of rows (n,) and keys (n,), divided by that of the base unflared.
 
-
-def profile_integral(rows: Table, row: NDArray, key: Keys, t: Floats) -> NDArray:
-    """Integral (n,) of `profile` from 0 to t; differences of it are exact under any sequence of cuts."""
-    return _profile(rows, row, key, t, summed=True)
-
-
-def _profile(rows: Table, row: NDArray, key: NDArray, t: Floats, summed: bool) -> NDArray:
+    ``summed`` is its integral from 0 to t, of which differences are exact under any sequence of cuts.
+    """
     taper = ranged(rows, "taper", row, key, Draw.TAPER)
     out = t - (1 - taper) * t * t / 2 if summed else 1 - (1 - taper) * t
     hand = np.flatnonzero(rows["drawn"][row])

@@ -314,12 +314,8 @@ class DrawnLines:
 
 
 def drawn_lines(branches: DrawnBranches) -> DrawnLines:
-    """Drawn branches with even segments, as many as they have themselves, at most `MAX_SEGMENTS`.
-
-    Raises
-    ------
-    SpeciesError
-        More than `MAX_DRAWN` branches.
+    """Drawn branches with even segments, as many as they have themselves, at most `MAX_SEGMENTS`; a `SpeciesError` if
+    there are more than `MAX_DRAWN`.
     """
     number = len(branches)
     if number > MAX_DRAWN:

@@ -173,8 +173,6 @@ def sway(rows: Table, branches: Branches, ahead: float = 0.0) -> Floats:
 
     Parameters
     ----------
-    rows : parameter table in the wind
-    branches : Branches of n
     ahead : float
         Seconds after the moment of the rows.
     """

@@ -37,13 +37,7 @@ class Packed:
 
 
 def send(stream: BinaryIO, *things: object) -> None:
-    """Write objects, or what is packed already, as one message.
-
-    Raises
-    ------
-    Closed, OSError
-        The receiver has ended.
-    """
+    """Write objects, or what is packed already, as one message; `Closed` or an OSError if the receiver has ended."""
     if stream.closed:
         raise Closed
     packed = [thing if isinstance(thing, Packed) else Packed(thing) for thing in things]
@@ -56,13 +50,7 @@ def send(stream: BinaryIO, *things: object) -> None:
 
 
 def receive(stream: BinaryIO) -> list[object]:
-    """Objects of the next message; their arrays can be written to.
-
-    Raises
-    ------
-    Closed
-        The sender has ended.
-    """
+    """Objects of the next message, whose arrays can be written to; `Closed` if the sender has ended."""
     if stream.closed:
         raise Closed
     (number,) = _numbers(stream, 1)

@@ -215,12 +215,8 @@ class _Child:
         self.peak = 0
 
     def greet(self) -> bool:
-        """Wait until it is there; whether it still is: it ends by itself when there is nothing to do.
-
-        Raises
-        ------
-        _StartError
-            It never was.
+        """Wait until it is there, a `_StartError` if it never was; whether it still is: it ends by itself when there is
+        nothing to do.
         """
         if not self._ready:
             timer = threading.Timer(_PATIENCE, self.kill)
@@ -254,13 +250,7 @@ class _Child:
         return answer
 
     def forget(self) -> None:
-        """Let go of what no call will need again.
-
-        Raises
-        ------
-        Closed, OSError
-            The process has ended.
-        """
+        """Let go of what no call will need again; `Closed` or an OSError if the process has ended."""
         for number in [number for number, given in self._known.items() if given.forgotten]:
             del self._known[number]
             send(self._process.stdin, "forget", number)

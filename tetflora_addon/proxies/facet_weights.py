@@ -179,7 +179,6 @@ def fitting(flora: Flora, number: int, rays: float = np.inf) -> Generator[float,
 
     Parameters
     ----------
-    flora : Flora
     number : int
         Index of the species.
     rays : float

@@ -60,7 +60,6 @@ class Meshes:
 
     Parameters
     ----------
-    surfaces : sequence of Surface
     surface : (i,) int
         Which of them each instance shows.
     matrices : (i, 4, 4) float64

@@ -120,7 +120,6 @@ class SharedParts(Generic[Parts]):
 
     Parameters
     ----------
-    camera : Camera
     filled : bool
         Whether proxies fill their tetrahedra, so that small ones without points would be holes.
     """

@@ -51,8 +51,6 @@ def summarize(
 
     Parameters
     ----------
-    flora : Flora
-    contents : Contents
     index : (nodes,) int
         Number of the summary that each node of the tree contributes to; contents of nodes with −1 are skipped.
     count : int

@@ -180,7 +180,6 @@ class Buffers:
 
     Parameters
     ----------
-    camera : Camera
     resolution : int
         Longer side of the finest buffer, pixels.
     occluders : (t, 3, 3) float64, optional

@@ -142,13 +142,7 @@ def species_from_dict(data: Any, identifier: str, source: str) -> Species:
 
 
 def species_from_json(content: bytes | str, identifier: str, source: str) -> Species:
-    """Check the text of a species file, as `species_from_dict` checks what it decodes to.
-
-    Raises
-    ------
-    SpeciesError
-        It is not JSON, or breaks a rule of the format.
-    """
+    """Check the text of a species file, as `species_from_dict` checks what it decodes to, or that it is JSON at all."""
     try:
         data = parse_json(content)
     except ValueError as error:
@@ -157,24 +151,12 @@ def species_from_json(content: bytes | str, identifier: str, source: str) -> Spe
 
 
 def read_species(path: Path) -> Species:
-    """Read and check one species file.
-
-    Raises
-    ------
-    SpeciesError
-        The file cannot be read, is not JSON, or breaks a rule of the format.
-    """
+    """Read and check one species file; whatever is wrong with it is a `SpeciesError`."""
     return species_from_json(species_file(path), path.stem, path.name)
 
 
 def species_file(path: Path) -> bytes:
-    """The content of a species file.
-
-    Raises
-    ------
-    SpeciesError
-        It cannot be read.
-    """
+    """The content of a species file; a `SpeciesError` if it cannot be read."""
     try:
         return read_whole(path, MAX_FILE_BYTES)
     except OSError as error:
@@ -237,13 +219,7 @@ def stamp(path: Path) -> tuple[int, int]:
 
 
 def checked_identifier(text: str) -> str:
-    """An identifier of a species, which may have come from any file.
-
-    Raises
-    ------
-    SpeciesError
-        It could name no file of a species.
-    """
+    """An identifier of a species, from any file; a `SpeciesError` if it could name no file of a species."""
     if not is_identifier(text):
         raise SpeciesError(f"{quoted(text)} cannot name a species. Use only {IDENTIFIER_RULE}")
     return text

@@ -233,7 +233,6 @@ def leaf_meshes(
         a kite for each plane; the leaves' own random numbers decide which.
     lengths_of : callable, optional
         Lengths (n,) of the leaves of branches in the image, in errors that do not show; those of long ones are finer.
-    thin : Thin, optional
     """
     groups = [group for some in whole for group in _bearers(flora, some)]
     if fractions_of is not None:

@@ -88,7 +88,7 @@ def _summer_colors(flora: Flora, pieces: Pieces) -> Floats:
 def wood_areas(flora: Flora, pieces: Pieces) -> Floats:
     """Surface (n,) of the wood of each piece, m²: perimeter × length at the mean radius."""
     branches = pieces.branches
-    low, high = (axes.profile_integral(flora.rows, branches.row, branches.key, t) for t in (pieces.t0, pieces.t1))
+    low, high = (axes.profile(flora.rows, branches.row, branches.key, t, summed=True) for t in (pieces.t0, pieces.t1))
     return tube_perimeter(flora.rows["sides"][branches.row]) * branches.radius * branches.length * (high - low)
 
 

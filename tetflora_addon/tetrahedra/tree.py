@@ -104,8 +104,6 @@ def best_diagonal(vertices: Floats) -> Integers:
     Diagonal ``k`` joins the middles of edges ``k`` and ``5 - k`` of `geometry.EDGES`; of equally good ones it is the
     first.
 
-    Notes
-    -----
     All children have the same volume. Let S be the sum of the squared edges, D² the squared diagonal, and p and q the
     squares of the edges whose middles it joins. Two of the inner tetrahedra have edges of (S − p + 4 D²) / 4, two of
     (S − q + 4 D²) / 4, where 4 D² = S − 2 (p + q). The three 4 D² add up to S, so that of the shortest diagonal is
@@ -152,8 +150,6 @@ def divide_by_shape(vertices: Floats) -> tuple[Floats, Floats]:
     Planes and children are as of `divide_in_eight`: those of it, or of `bisect_thrice`. Worst qualities are compared,
     with a `HANDICAP` on the bisection of compact tetrahedra.
 
-    Notes
-    -----
     The paper "chooses a subdivision depending on the aspect ratio of the resulting tetrahedra in order to avoid sliver
     subvolumes" (section 4). The eight leave compact shapes at least three quarters of their quality, but cannot help
     with long ones: where opposite edges differ much, all three diagonals are equally bad. Those gain by bisection.
