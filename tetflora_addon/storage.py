@@ -95,19 +95,8 @@ def cached(kind: str, content: str, shape: tuple[int, ...], compute: Callable[[]
 
 
 def clear(folder: Path | None = None, names: re.Pattern[str] | None = None) -> int:
-    """Delete all results of this user in the folder, and nothing else that lies there; returns how many there were.
-
-    Parameters
-    ----------
-    folder : Path, optional
-        Another one than that which is used, for files of other names.
-    names : re.Pattern, optional
-        Of these.
-
-    Raises
-    ------
-    TetFloraError
-        Some cannot be deleted.
+    """Delete all results of this user in the folder, or files of some names in another one, and nothing else that lies
+    there; returns how many there were. What cannot be deleted is a `TetFloraError`.
     """
     number, folder = 0, folder or _folder
     try:

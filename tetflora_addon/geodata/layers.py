@@ -36,12 +36,8 @@ _Feature = dict[str, Any]
 
 
 def read_features(path: Path, chosen: int = 0) -> tuple[list[_Feature], System]:
-    """Features of a file, of which each is an object with a geometry, and their system.
-
-    Parameters
-    ----------
-    chosen : int
-        As of `chosen_system`.
+    """Features of a file, of which each is an object with a geometry, and their system; ``chosen`` is as of
+    `chosen_system`.
 
     Raises
     ------

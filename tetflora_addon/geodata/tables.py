@@ -118,19 +118,7 @@ def read_csv(path: Path, skip: bool = False, most: int | None = None) -> Table:
 def read_points(path: Path, _skip: bool = False, most: int | None = None, chosen: int = 0) -> Table:
     """Points of a GeoJSON file with their properties; an area counts as its middle, lines do not count.
 
-    Parameters
-    ----------
-    most : int, optional
-        Features at most, for a preview.
-    chosen : int
-        As of `read_features`.
-
-    Raises
-    ------
-    OSError
-        It cannot be read.
-    SceneError
-        It is broken; names the feature.
+    Of a preview there are so many features at most; what is chosen, and errors, are as of `read_features`.
     """
     features, system = read_features(path, chosen)
     name, without = path.name, 0

@@ -495,18 +495,8 @@ def needed(flora: Flora, number: int) -> list[tuple[Flora, int]]:
 
 
 def weights_of(flora: Flora, number: int, states: tuple[int, ...], known: Known) -> Floats:
-    """Weights (2, s, r, k) of a species of a flora in summer, in some states; 1 in the others.
-
-    Parameters
-    ----------
-    flora : Flora
-        In summer.
-    number : int
-        Index of the species.
-    states : tuple of int
-        Indices of `SHARES`.
-    known : callable
-        What was measured of those that are `needed`.
+    """Weights (2, s, r, k) of a species (index) of a flora in summer, in some states (indices of `SHARES`), from what
+    was measured of those that are `needed`; 1 in the others.
     """
     own, rows = flora.species[number], flora.rows[flora.rows["species"] == number]
     out = np.ones((2, max(states) + 1, len(rows), len(COUNTS)))

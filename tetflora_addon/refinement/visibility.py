@@ -96,7 +96,6 @@ class AlphaBuffer:
             Positively oriented, overlapping with none that is there, meters, world space.
         extinction : (n,) float64
             κ ≥ 0 along the way from the eye, 1/m; may be infinite.
-
         """
         count = len(vertices)
         fragments = tetrahedron_fragments(vertices, self.camera, self.width, self.height)

@@ -160,17 +160,11 @@ def nurbs_chain(
 
 
 def joined_edges(chains: Chains) -> tuple[Floats, Integers, Integers]:
-    """One graph of chains; those that begin on another are moved onto its line and joined to it there.
+    """Points (p, 4), edges (e, 2) and the chain (e,) of each, of one graph of chains: those that begin on another are
+    moved onto its line and joined to it there.
 
     A chain begins on another where its first point, or else its last, is nearer to the other's line than its radius
     there, or than 1 % of the size of all.
-
-    Returns
-    -------
-    points : (p, 4) float64
-    edges : (e, 2) int64
-    line : (e,) int64
-        Chain of each edge.
     """
     points, edges = chains.points.copy(), chains.edges()
     owner = np.repeat(np.arange(len(chains.cyclic)), np.diff(chains.first))

@@ -271,7 +271,8 @@ def world_cubes(bounds: ArrayLike) -> tuple[float, Integers, Integers]:
 
 
 def world_root(bounds: ArrayLike, origin: ArrayLike = (0.0, 0.0, 0.0)) -> TetrahedralTree:
-    """Tree whose terminals are Kuhn's tetrahedra of the cubes around a scene.
+    """Tree whose terminals are Kuhn's tetrahedra of the cubes around a scene, see `world_cubes`; none of them is
+    `inside`.
 
     Parameters
     ----------
@@ -280,16 +281,6 @@ def world_root(bounds: ArrayLike, origin: ArrayLike = (0.0, 0.0, 0.0)) -> Tetrah
         has an order too.
     origin : (3,) float64
         Where in the world coordinates begin, whole meters: cubes are those of the world.
-
-    Returns
-    -------
-    TetrahedralTree
-        No terminal is marked `inside`, as nothing of it follows a camera.
-
-    Raises
-    ------
-    ValueError
-        If the bounds are not finite.
     """
     origin = np.asarray(origin, np.float64)
     side, low, number = world_cubes(np.asarray(bounds, np.float64) + origin)

@@ -248,22 +248,8 @@ class TetrahedralTree:
         return np.flatnonzero(self.children[:, 0] < 0)
 
     def split(self, nodes: ArrayLike) -> Integers32:
-        """Divide terminal tetrahedra by longest-edge bisection.
-
-        Parameters
-        ----------
-        nodes : (n,) int
-            Terminal nodes with a tetrahedron, each once.
-
-        Returns
-        -------
-        (n, 2) int32
-            The children on sides 0 and 1 of the planes; they inherit `inside`.
-
-        Raises
-        ------
-        ValueError
-            If a node is not terminal, has no tetrahedron, or occurs twice.
+        """Divide terminal nodes (n,) with a tetrahedron by longest-edge bisection; children and errors are as of
+        `divide`.
         """
         nodes = np.asarray(nodes, np.intp)
         planes, halves = bisect(self._tetrahedra(nodes))
@@ -272,10 +258,11 @@ class TetrahedralTree:
         return children
 
     def split_by_shape(self, nodes: ArrayLike) -> Integers32:
-        """Divide terminal tetrahedra into eight as suits their shape: the canonical eight, or three bisections.
+        """Divide terminal nodes (n,) with a tetrahedron into eight as suits their shape: the canonical eight, or three
+        bisections.
 
-        What is given and refused is as of `split`. Returned are terminals three levels further down, (n, 8) int32, see
-        `tree.divide_by_shape`; they inherit `inside`.
+        Returned are terminals three levels further down, (n, 8) int32, see `tree.divide_by_shape`. Errors are as of
+        `divide`.
         """
         nodes = np.asarray(nodes, np.intp)
         planes, pieces = divide_by_shape(self._tetrahedra(nodes))
