@@ -60,12 +60,8 @@ def is_regular(path: Path) -> bool:
 
 
 def read_whole(path: Path, most: int) -> bytes:
-    """The content of a regular file of at most so many bytes.
-
-    Raises
-    ------
-    OSError
-        It cannot be read, is too large, or is a link, folder, pipe or device.
+    """The content of a regular file of at most so many bytes; it is an OSError if it cannot be read, is too large, or
+    is a link, folder, pipe or device.
     """
     _refuse_nul(path)
     before = os.lstat(path)

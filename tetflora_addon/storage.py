@@ -219,15 +219,11 @@ Arrays = tuple[NDArray, ...]
 
 
 def memoized(most_bytes: int) -> Callable[[Callable[..., Arrays]], Callable[..., Arrays]]:
-    """Decorator for functions that take arrays alone, and give arrays that follow from these alone.
+    """Decorator for functions that take arrays alone, and give arrays that follow from these alone: all results of the
+    function together may take so many bytes.
 
     Results are read only, for all who ask for the same get the same arrays. What nobody has asked for longest goes
     first; what is too large for the limit by itself is given, not kept, and makes nothing else go.
-
-    Parameters
-    ----------
-    most_bytes : int
-        That all results of the function together take.
     """
 
     def decorated(function: Callable[..., Arrays]) -> Callable[..., Arrays]:

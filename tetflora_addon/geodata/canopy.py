@@ -110,16 +110,8 @@ def without_areas(raster: Raster, areas: Sequence[Floats]) -> tuple[Raster, int]
 
 
 def find_trees(values: Floats32, cell: float, least: float) -> Job[Trees]:
-    """Find trees; yields progress.
-
-    Parameters
-    ----------
-    values : (h, w) float32
-        Heights above the ground, meters; nan where nothing is known.
-    cell : float
-        Side of a cell, meters.
-    least : float
-        Height of the smallest tree, meters.
+    """Find trees of at least some height in heights (h, w) above the ground, nan where nothing is known, of cells of
+    some side; all are meters. Yields progress.
     """
     width = values.shape[1]
     yield Progress(0.1, "Looking for treetops")

@@ -27,14 +27,8 @@ _RECORD, _FIRST, _LATER, _VALUE = 1024, 146, 170, 6  # of a USGS model: bytes, v
 
 
 def read_grid(path: Path) -> Job[Raster]:
-    """Read a raster of any of `ENDINGS` by what it holds; yields progress.
-
-    Raises
-    ------
-    OSError
-        It cannot be read.
-    SceneError
-        It is broken; names the line or tag.
+    """Read a raster of any of `ENDINGS` by what it holds; yields progress. It is an OSError if it cannot be read, and a
+    `SceneError` that names the line or tag if it is broken.
     """
     ending = path.suffix.lower()
     if ending in (".tif", ".tiff"):

@@ -230,14 +230,8 @@ def read_inventory(
 
 
 def preview(path: Path) -> list[Column]:
-    """Columns of a file as they are taken from its first rows.
-
-    Raises
-    ------
-    OSError
-        It cannot be read.
-    SceneError
-        It is broken.
+    """Columns of a file as they are taken from its first rows. It is an OSError if it cannot be read, and a
+    `SceneError` if it is broken.
     """
     table_ = _table(path, True, _PREVIEWED, PLAIN)
     taken = taken_for(table_, {})

@@ -37,14 +37,7 @@ _Feature = dict[str, Any]
 
 def read_features(path: Path, chosen: int = 0) -> tuple[list[_Feature], System]:
     """Features of a file, of which each is an object with a geometry, and their system; ``chosen`` is as of
-    `chosen_system`.
-
-    Raises
-    ------
-    OSError
-        It cannot be read.
-    SceneError
-        It is broken; names the feature.
+    `chosen_system`. It is an OSError if it cannot be read, and a `SceneError` that names the feature if it is broken.
     """
     name = path.name
     if path.suffix.lower() in (".shp", ".gpkg"):

@@ -143,14 +143,8 @@ def checked_size(width: int, height: int, what: str) -> None:
 
 
 def read_ascii(path: Path) -> Job[Raster]:
-    """Read an ASCII grid (Esri); yields progress. A file ``.prj`` beside it may name its coordinate system.
-
-    Raises
-    ------
-    OSError
-        It cannot be read.
-    SceneError
-        It is broken; names the line.
+    """Read an ASCII grid (Esri), whose coordinate system a file ``.prj`` beside it may name; yields progress. It is an
+    OSError if it cannot be read, and a `SceneError` that names the line if it is broken.
     """
     content = read_whole(path, MAX_TEXT)
     name, header, start = path.name, {}, 0
@@ -270,14 +264,8 @@ def system_beside(path: Path) -> System:
 
 
 def world_file(path: Path) -> list[Floats]:
-    """Middle of the first cell, and steps along and down, of the world file of an image.
-
-    Raises
-    ------
-    OSError
-        It cannot be read.
-    SceneError
-        There is none, or it is broken; names the line.
+    """Middle of the first cell, and steps along and down, of the world file of an image. It is an OSError if it cannot
+    be read, and a `SceneError`, which names the line, if there is none or it is broken.
     """
     ending = path.suffix.lower()
     endings = f"{ending[:2]}{ending[-1:]}w", f"{ending}w", ".wld"

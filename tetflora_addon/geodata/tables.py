@@ -118,7 +118,19 @@ def read_csv(path: Path, skip: bool = False, most: int | None = None) -> Table:
 def read_points(path: Path, _skip: bool = False, most: int | None = None, chosen: int = 0) -> Table:
     """Points of a GeoJSON file with their properties; an area counts as its middle, lines do not count.
 
-    Of a preview there are so many features at most; what is chosen, and errors, are as of `read_features`.
+    Parameters
+    ----------
+    most : int, optional
+        Features at most, for a preview.
+    chosen : int
+        As of `read_features`.
+
+    Raises
+    ------
+    OSError
+        It cannot be read.
+    SceneError
+        It is broken; names the feature.
     """
     features, system = read_features(path, chosen)
     name, without = path.name, 0
@@ -217,13 +229,7 @@ class Quantity(NamedTuple):
 
 
 def cell_of(text: str, points: bool = False) -> Quantity:
-    """What a cell says.
-
-    Parameters
-    ----------
-    points : bool
-        Other cells have decimal points, so that a comma before three digits parts thousands.
-    """
+    """What a cell says; where other cells have decimal ``points``, a comma before three digits parts thousands."""
     text = text.strip().lower().strip("*").strip()
     if text in _MISSING:
         return Quantity(0.0, kind=NOTHING)

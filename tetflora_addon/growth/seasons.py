@@ -45,12 +45,9 @@ it is in summer; and the parts of the last that have the fresh color, those of a
 
 @dataclass(frozen=True)
 class Season:
-    """A day of the year at a place. Fields with a label are properties of a scene, and documented by their tooltips.
+    """A day of the year at a place, or a `TetFloraError` for a number that is none or is out of its limits.
 
-    Raises
-    ------
-    TetFloraError
-        A number that is none or is out of its limits.
+    Fields with a label are properties of a scene, and documented by their tooltips.
     """
 
     day: float = setting(

@@ -325,14 +325,8 @@ class Terrain:
     border: Floats | None = None
 
     def __post_init__(self) -> None:
-        """Refuse what cannot be stood on.
-
-        Raises
-        ------
-        SceneError
-            No triangles, or some with places that are no numbers.
-        ValueError
-            Arrays that do not fit each other: a mistake of the caller, not of the artist.
+        """Refuse what cannot be stood on by a `SceneError`: no triangles, or some with places that are no numbers.
+        Arrays that do not fit each other are a ValueError: a mistake of the caller, not of the artist.
         """
         count = len(self.triangles)
         if not count:

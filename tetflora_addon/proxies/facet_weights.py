@@ -131,12 +131,8 @@ def unmeasured(flora: Flora) -> list[int]:
 
 
 def measuring(flora: Flora, species: Collection[int]) -> Generator[tuple[str, float], None, None]:
-    """Measure weights that are not known yet; `facet_weights` has them afterward.
-
-    Yields
-    ------
-    str, float
-        Name of the species at work, and the fraction of its measurement that is done.
+    """Measure weights that are not known yet, so that `facet_weights` has them; yields the name of the species at work,
+    and the fraction of its measurement that is done.
     """
     for number in sorted(set(species)):
         left = [variant for variant in needed(flora, number) if _known(*variant) is None]

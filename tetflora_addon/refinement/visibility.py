@@ -246,16 +246,8 @@ def pixels_per_solid_angle(camera: Camera, directions: Floats) -> Floats:
 
 
 class PanoramaBuffer:
-    """The fragments of all tetrahedra around the eye; to be used as an `AlphaBuffer`.
-
-    Parameters
-    ----------
-    camera : Camera
-        A panorama.
-    side : int
-        Of each of the six faces, pixels.
-    occluders : (t, 3, 3) float64, optional
-        Opaque triangles, meters.
+    """The fragments of all tetrahedra around the eye of a panorama, before opaque triangles (t, 3, 3), meters, on six
+    faces of so many pixels a side; to be used as an `AlphaBuffer`.
     """
 
     def __init__(self, camera: Camera, side: int, occluders: Floats | None = None) -> None:

@@ -82,21 +82,8 @@ def _read_leaf_year(reader: FileReader, data: Any, name: str) -> LeafYear:
 
 
 def species_from_dict(data: Any, identifier: str, source: str) -> Species:
-    """Check a decoded species file and turn it into a `Species`.
-
-    Parameters
-    ----------
-    data : object
-        What `json.load` gave.
-    identifier : str
-        Name by which plants refer to the species.
-    source : str
-        Named in errors, usually the file's path.
-
-    Raises
-    ------
-    SpeciesError
-        Names the source, the key and what is allowed.
+    """Check what `json.load` gave of a species file and turn it into a `Species`, to which plants refer by an
+    identifier; a `SpeciesError` names the source, usually the file's path, the key and what is allowed.
     """
     reader = FileReader(source)
     if not isinstance(data, dict):
@@ -284,14 +271,8 @@ def _listed(folder: Path, _entries: tuple[tuple[str, int, int, int], ...], remed
 
 
 def load_species(identifier: str, folders: Sequence[Path] = (), known: Mapping[str, FileInfo] | None = None) -> Species:
-    """Read a species; unchanged files are read once.
-
-    Parameters
-    ----------
-    folders : sequence of Path
-        As of `list_species`.
-    known : mapping, optional
-        What `list_species` returned a moment ago.
+    """Read a species; unchanged files are read once. Folders, and what is known of their files, are as of
+    `list_species`.
 
     Raises
     ------

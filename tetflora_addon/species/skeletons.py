@@ -287,12 +287,8 @@ _SAME = 1e-6  # of the largest; radii and lengths that differ by less are equal
 
 @dataclass(frozen=True, eq=False)
 class Skeleton:
-    """Points of a plant's drawn branches; equal where the numbers are.
-
-    Raises
-    ------
-    ValueError
-        Arrays that do not fit each other, or a parent that does not stand before its child.
+    """Points of a plant's drawn branches, equal where the numbers are, or a ValueError for arrays that do not fit each
+    other, or a parent that does not stand before its child.
     """
 
     points: Floats  # (p, 3): meters in the plant's space: z up, the origin at its foot

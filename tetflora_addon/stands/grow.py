@@ -231,15 +231,7 @@ _DEAD_DIAMETER = 0.4
 def grown(
     plants: Plants, crowns: Crowns, taken: NDArray, light: LightGrid, traits: StandTraits, block: slice
 ) -> Plants:
-    """Some plants a year later.
-
-    Parameters
-    ----------
-    crowns, taken
-        Of these plants: where they are, and the light that they take, m².
-    block : slice
-        Of all plants.
-    """
+    """Some plants, a block of all, a year later, by their crowns and the light that they take, m²."""
     one = plants.take(block)
     x, y, radius, base, height = (
         value[block] for value in (crowns.x, crowns.y, crowns.radius, crowns.base, crowns.height)
@@ -356,14 +348,8 @@ _OUTSIDE = 0.1
 
 
 def planted(site: StandSite, traits: StandTraits, suitability: Floats, density: float, seed: int) -> Plants:
-    """Plants evenly spread, each somewhere in a square of its own.
-
-    Parameters
-    ----------
-    suitability : (g, cells) float64
-        How well each species grows.
-    density : float
-        Plants on a hectare.
+    """Plants evenly spread, so many on a hectare, each somewhere in a square of its own; suitability (g, cells) is how
+    well each species grows.
     """
     if density <= 0.0 or traits.planted.sum() <= 0.0:
         return Plants.empty()
@@ -569,14 +555,7 @@ def _check(settings: StandSettings) -> None:
 
 
 class GrowingStand:
-    """A stand in a year.
-
-    Attributes
-    ----------
-    plants : Plants
-        Those that live.
-    dead : DeadPlants
-    """
+    """A stand in a year: ``plants`` that live, and ``dead`` ones."""
 
     def __init__(self, site: StandSite, traits: StandTraits, settings: StandSettings) -> None:
         self.site, self.traits, self.settings = site, traits, settings

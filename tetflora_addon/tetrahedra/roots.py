@@ -246,19 +246,8 @@ SMALLEST = 1.0
 
 
 def world_cubes(bounds: ArrayLike) -> tuple[float, Integers, Integers]:
-    """Cubes around what is in a box, (2, 3), meters; at most two along each axis.
-
-    Returns
-    -------
-    side : float
-        Meters, a power of two.
-    low, number : (3,) int64
-        Lowest corner, in sides, and cubes along each axis, 1 or 2.
-
-    Raises
-    ------
-    ValueError
-        If the bounds are not finite.
+    """Cubes around what is in a box (2, 3), meters: their side, a power of two, the lowest corner (3,) in sides, and
+    how many there are along each axis (3,), 1 or 2. A ValueError if the box is not finite.
     """
     bounds = np.asarray(bounds, np.float64)
     if not np.isfinite(bounds).all():
