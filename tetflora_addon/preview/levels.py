@@ -188,11 +188,6 @@ def colors_of(level: Level, mode: str, deepest: int) -> Floats32:
         changed.
     deepest : int
         Depth of the brightest color: colors stay from level to level.
-
-    Raises
-    ------
-    ValueError
-        If there is no such mode.
     """
     if mode == "LEVEL":
         return ramp(level.depth / max(deepest, 1))
@@ -201,12 +196,10 @@ def colors_of(level: Level, mode: str, deepest: int) -> Floats32:
     if mode == "CONTRIBUTION":
         pixels = np.maximum(level.contribution, _LEAST)
         return ramp(np.log(pixels / _LEAST) / np.log(_MOST / _LEAST))
-    if mode == "FORM":
-        table = np.zeros((len(Decision), 3), np.float32)
-        for decision, color in FORMS.items():
-            table[decision] = color
-        return table[level.decision]
-    raise ValueError(f'unknown color mode "{mode}"; use LEVEL, VISIBILITY, FORM or CONTRIBUTION')
+    table = np.zeros((len(Decision), 3), np.float32)
+    for decision, color in FORMS.items():
+        table[decision] = color
+    return table[level.decision]
 
 
 def as_shown(linear: NDArray[np.floating]) -> Floats32:
@@ -271,14 +264,7 @@ def project(vertices: Floats, extinction: Floats, camera: Camera) -> Projected:
         κ ≥ 0, 1/m.
     camera : Camera
         Perspective or orthographic; panoramas have no straight edges.
-
-    Raises
-    ------
-    ValueError
-        If the camera is a panorama.
     """
-    if camera.kind == "PANO":
-        raise ValueError("a panorama bends the edges of tetrahedra; use a perspective or orthographic camera")
     vertices = np.asarray(vertices, np.float64)
     gradients = barycentric_gradients(vertices)
     if camera.kind == "ORTHO":

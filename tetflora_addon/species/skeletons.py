@@ -287,9 +287,7 @@ _SAME = 1e-6  # of the largest; radii and lengths that differ by less are equal
 
 @dataclass(frozen=True, eq=False)
 class Skeleton:
-    """Points of a plant's drawn branches, equal where the numbers are, or a ValueError for arrays that do not fit each
-    other, or a parent that does not stand before its child.
-    """
+    """Points of a plant's drawn branches, equal where the numbers are."""
 
     points: Floats  # (p, 3): meters in the plant's space: z up, the origin at its foot
     radius: Floats  # (p,): meters
@@ -304,11 +302,6 @@ class Skeleton:
             array = np.array(getattr(self, name), dtype=dtype, order="C")
             array.flags.writeable = False
             object.__setattr__(self, name, array)
-        n = len(self.points)
-        if self.points.shape != (n, 3) or {self.radius.shape, self.parent.shape, self.line.shape} != {(n,)}:
-            raise ValueError("a skeleton must have (p, 3) points, (p,) radii, (p,) parents and (p,) lines")
-        if not ((self.parent >= -1) & (self.parent < np.arange(n))).all():
-            raise ValueError("the parents of a skeleton must precede their children; use -1 for no parent")
 
     @cached_property
     def content(self) -> bytes:

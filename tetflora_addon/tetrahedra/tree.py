@@ -248,24 +248,23 @@ class TetrahedralTree:
         return np.flatnonzero(self.children[:, 0] < 0)
 
     def split(self, nodes: ArrayLike) -> Integers32:
-        """Divide terminal nodes (n,) with a tetrahedron by longest-edge bisection; children and errors are as of
+        """Divide terminal nodes (n,), each once, with a tetrahedron by longest-edge bisection; children are as of
         `divide`.
         """
         nodes = np.asarray(nodes, np.intp)
-        planes, halves = bisect(self._tetrahedra(nodes))
+        planes, halves = bisect(self.vertices(nodes))
         children = self.divide(nodes, planes)
         self.place(children.ravel(), halves.reshape(-1, 4, 3))
         return children
 
     def split_by_shape(self, nodes: ArrayLike) -> Integers32:
-        """Divide terminal nodes (n,) with a tetrahedron into eight as suits their shape: the canonical eight, or three
-        bisections.
+        """Divide terminal nodes (n,), each once, with a tetrahedron into eight as suits their shape: the canonical
+        eight, or three bisections.
 
-        Returned are terminals three levels further down, (n, 8) int32, see `tree.divide_by_shape`. Errors are as of
-        `divide`.
+        Returned are terminals three levels further down, (n, 8) int32, see `tree.divide_by_shape`.
         """
         nodes = np.asarray(nodes, np.intp)
-        planes, pieces = divide_by_shape(self._tetrahedra(nodes))
+        planes, pieces = divide_by_shape(self.vertices(nodes))
         for first, end in ((0, 1), (1, 3), (3, 7)):  # planes are in the order of a heap
             nodes = self.divide(nodes, planes[:, first:end].reshape(-1, 4)).reshape(-1)
         self.place(nodes, pieces.reshape(-1, 4, 3))
@@ -285,15 +284,8 @@ class TetrahedralTree:
         -------
         (n, 2) int32
             The children on sides 0 and 1; they inherit `inside`.
-
-        Raises
-        ------
-        ValueError
-            If a node is not terminal or occurs twice.
         """
         nodes = np.asarray(nodes, np.intp)
-        if (self.children[nodes, 0] >= 0).any() or (len(nodes) and np.bincount(nodes).max() > 1):
-            raise ValueError("only terminal nodes can be split, and each only once")
         first = self._size
         self._append(
             np.repeat(nodes.astype(np.int32), 2),
@@ -367,12 +359,6 @@ class TetrahedralTree:
             part = slice(start, start + POINT_BATCH)
             found[part] = self._descend(points[part])
         return found
-
-    def _tetrahedra(self, nodes: Integers) -> Floats:
-        vertices = self.vertices(nodes)
-        if np.isnan(vertices[:, 0, 0]).any():
-            raise ValueError("only nodes with a tetrahedron can be bisected; split regions by a plane instead")
-        return vertices
 
     def _descend(self, points: Floats) -> Integers32:
         node = np.zeros(len(points), np.int32)
