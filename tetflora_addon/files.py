@@ -111,7 +111,8 @@ def replace(part: Path, path: Path) -> None:
 
 
 def parse_json(content: bytes | str, constant: Callable[[str], float] = float) -> Any:
-    """Decode JSON of which every part is a Python value that texts and floats can hold.
+    """Decode JSON of which every part is a Python value that texts and floats can hold. It is a ValueError if it is
+    none, or a key comes twice in an object: Python's reader would take the last one and say nothing.
 
     Integers beyond floats become infinite, so that whoever checks a number refuses it by the name of its key.
 
@@ -119,11 +120,6 @@ def parse_json(content: bytes | str, constant: Callable[[str], float] = float) -
     ----------
     constant : callable
         Makes numbers of ``NaN``, ``Infinity`` and ``-Infinity``, which JSON does not have.
-
-    Raises
-    ------
-    ValueError
-        It is no JSON, or a key comes twice in an object: Python's reader would take the last one and say nothing.
     """
     try:
         # Some editors begin a file with a mark of its encoding.

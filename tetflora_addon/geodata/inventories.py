@@ -204,7 +204,8 @@ class Column(NamedTuple):
 def read_inventory(
     path: Path, epsg: int = 0, units: str = METRIC, skip: bool = False, columns: Mapping[str, str] | None = None
 ) -> Inventory:
-    """Read a file.
+    """Read a file. It is an OSError if it cannot be read, and a `SceneError` that names line or feature, and column, if
+    it is broken.
 
     Parameters
     ----------
@@ -217,13 +218,6 @@ def read_inventory(
     columns : mapping, optional
         What columns hold by their titles, for those that are not to be told by title and values: one of `FIELDS`, with
         a unit if the title does not name it, such as ``height ft``; empty for none.
-
-    Raises
-    ------
-    OSError
-        It cannot be read.
-    SceneError
-        It is broken; names line or feature, and column.
     """
     table_ = _table(path, skip, epsg=epsg)
     return _Reading(table_, units, skip, _chosen(table_, columns or {})).inventory(epsg)

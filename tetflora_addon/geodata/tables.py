@@ -54,7 +54,8 @@ class Table:
 
 
 def read_csv(path: Path, skip: bool = False, most: int | None = None) -> Table:
-    """Read separated values; the first line names the columns, or the second after one such as ``sep=;``.
+    """Read separated values; the first line names the columns, or the second after one such as ``sep=;``. It is an
+    OSError if the file cannot be read, and a `SceneError` that names the line if it is broken.
 
     Parameters
     ----------
@@ -62,13 +63,6 @@ def read_csv(path: Path, skip: bool = False, most: int | None = None) -> Table:
         Leave out rows with other numbers of values than the first line.
     most : int, optional
         Rows at most, for a preview.
-
-    Raises
-    ------
-    OSError
-        It cannot be read.
-    SceneError
-        It is broken; names the line.
     """
     content = read_whole(path, MAX_BYTES)
     name = path.name
@@ -116,7 +110,8 @@ def read_csv(path: Path, skip: bool = False, most: int | None = None) -> Table:
 
 
 def read_points(path: Path, _skip: bool = False, most: int | None = None, chosen: int = 0) -> Table:
-    """Points of a GeoJSON file with their properties; an area counts as its middle, lines do not count.
+    """Points of a GeoJSON file with their properties; an area counts as its middle, lines do not count. Errors are
+    those of `read_features`.
 
     Parameters
     ----------
@@ -124,13 +119,6 @@ def read_points(path: Path, _skip: bool = False, most: int | None = None, chosen
         Features at most, for a preview.
     chosen : int
         As of `read_features`.
-
-    Raises
-    ------
-    OSError
-        It cannot be read.
-    SceneError
-        It is broken; names the feature.
     """
     features, system = read_features(path, chosen)
     name, without = path.name, 0

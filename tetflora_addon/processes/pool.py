@@ -80,7 +80,8 @@ tell: Callable[[str], object] = _print
 def in_processes(
     function: Callable[[_Shared, _Item], _Result], shared: _Shared, items: Iterable[_Item], worth: bool = True
 ) -> Iterator[_Result]:
-    """Results of ``function(shared, item)`` for items, in their order, made on all cores.
+    """Results of ``function(shared, item)`` for items, in their order, made on all cores; what the function raises
+    comes where its result would.
 
     Parameters
     ----------
@@ -92,11 +93,6 @@ def in_processes(
         No more are taken ahead than there are threads.
     worth : bool
         Whether this is work enough for other processes.
-
-    Raises
-    ------
-    Exception
-        Whatever the function raises, where its result would come.
     """
     if not worth or parallel.within() or not number():
         yield from (function(shared, item) for item in items)

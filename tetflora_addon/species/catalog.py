@@ -272,12 +272,8 @@ def _listed(folder: Path, _entries: tuple[tuple[str, int, int, int], ...], remed
 
 def load_species(identifier: str, folders: Sequence[Path] = (), known: Mapping[str, FileInfo] | None = None) -> Species:
     """Read a species; unchanged files are read once. Folders, and what is known of their files, are as of
-    `list_species`.
-
-    Raises
-    ------
-    SpeciesError
-        Unknown identifier (the message lists the known ones), or a broken file.
+    `list_species`. It is a `SpeciesError` if the identifier is not known (the message lists those that are), or the
+    file is broken.
     """
     known = list_species(folders) if known is None else known
     if identifier not in known:

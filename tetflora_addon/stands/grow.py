@@ -516,15 +516,11 @@ class StandSettings:
 
 
 def grow(site: StandSite, species: Sequence[StandSpecies], settings: StandSettings) -> Job[Records]:
-    """Grow a stand; a job, which yields after each year and returns its records.
+    """Grow a stand; a job, which yields after each year and returns its records, or a `TetFloraError` that names a
+    setting that cannot be, or ground that is too large.
 
-    These are of plants at year 0, each ``interval`` years, at the end, and whenever one appears, dies, falls or is
+    Records are of plants at year 0, each ``interval`` years, at the end, and whenever one appears, dies, falls or is
     gone; with an interval of 0 those of the end alone.
-
-    Raises
-    ------
-    TetFloraError
-        A setting cannot be, or the ground is too large; names it.
     """
     stand = begun(site, species, settings)
     for year in range(settings.years):

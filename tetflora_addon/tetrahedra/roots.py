@@ -63,7 +63,7 @@ _Piece = Floats | _Cut | _View
 
 
 def view_root(camera: ViewingCamera, bounds: ArrayLike) -> TetrahedralTree:
-    """Tree whose terminals are the view and the space around it.
+    """Tree whose terminals are the view and the space around it; a ValueError if bounds or camera are not finite.
 
     Parameters
     ----------
@@ -78,11 +78,6 @@ def view_root(camera: ViewingCamera, bounds: ArrayLike) -> TetrahedralTree:
     TetrahedralTree
         The pyramid of a perspective view is two terminals, the box of an orthographic one six. They are marked
         `inside`, all others are not; children inherit it.
-
-    Raises
-    ------
-    ValueError
-        If bounds or camera are not finite.
     """
     bounds = np.asarray(bounds, np.float64)
     if not (np.isfinite(bounds).all() and np.isfinite(camera.position).all() and np.isfinite(camera.window).all()):
