@@ -120,13 +120,9 @@ class _Finer:
     """Finer levels of a model, made as they are asked for: the last ones take as long as all others."""
 
     def __init__(self, model: LeafModel) -> None:
-        self._lock, self._found = Lock(), []
-        if model.shape is None:
-            self._next = iter([])
-            self._found += _round_levels(model)
-        else:
-            self._next = _each_level(model, model.shape)
-        self._complete = model.shape is None
+        self._lock, self._complete = Lock(), model.shape is None
+        self._found = list(_round_levels(model)) if self._complete else []
+        self._next = _each_level(model)
 
     def until(self, error: float = 0.0, number: int = 1 << 10) -> tuple[list[LeafLevel], bool]:
         """Levels, the coarsest first, up to one within an error or up to a number; and whether these are all."""
@@ -152,9 +148,9 @@ def _finer(model: LeafModel) -> _Finer:
     return _Finer(model)
 
 
-def _each_level(model: LeafModel, shape: Shape) -> Iterator[LeafLevel]:
+def _each_level(model: LeafModel) -> Iterator[LeafLevel]:
     """Levels of a model that has a shape, each worth while for its error."""
-    error = coarse_error(model)
+    shape, error = model.shape, coarse_error(model)
     for tolerance in (2.0 * SPARSE, *TOLERANCES) if isinstance(shape, Needles) else TOLERANCES:
         made = fitted(shape, tolerance, model.area, model.reach)
         if made.error > _FINER * error:
