@@ -215,7 +215,7 @@ def _best_prisms(corners: Floats) -> list[tuple[float, _Piece]]:
 def _hang(tree: TetrahedralTree, node: int, piece: _Piece, camera: ViewingCamera) -> None:
     """Put a piece, given in camera space, at a terminal node; the pieces of a root are some dozens."""
     if isinstance(piece, _View):
-        tree.mark_inside([node])
+        tree.inside[node] = True  # and so will be what it is divided into
         _hang(tree, node, piece.piece, camera)
     elif isinstance(piece, _Cut):
         plane = plane_through(_to_world(camera, piece.through), _to_world(camera, _center(piece.negative)))

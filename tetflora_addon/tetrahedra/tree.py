@@ -302,10 +302,6 @@ class TetrahedralTree:
         self._rows["vertices"][nodes] = vertices
         self._made += len(np.atleast_1d(nodes))
 
-    def mark_inside(self, nodes: ArrayLike) -> None:
-        """Say of nodes ``(n,)``, before they are divided, that they lie within the view."""
-        self._rows["inside"][nodes] = True
-
     def order(
         self, eye: ArrayLike | None = None, direction: ArrayLike | None = None, back_to_front: bool = False
     ) -> Integers32:
