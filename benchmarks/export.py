@@ -29,7 +29,7 @@ from tetflora_addon.blender.scene.fields import write_field
 from tetflora_addon.blender.scene.plants import read_plants
 from tetflora_addon.blender.worker import run_to_end
 from tetflora_addon.compiled.flora import compile_species
-from tetflora_addon.export.levels import differences, levels_of
+from tetflora_addon.export.levels import levels_of
 from tetflora_addon.growth.seeds import Seeds
 from tetflora_addon.species.catalog import load_species
 
@@ -159,7 +159,7 @@ def _levels(species: tuple[str, ...]) -> dict[str, float]:
         flora = compile_species([load_species(name)])
         plants = Seeds.upright(2)
         like = levels_of(flora, plants.take(slice(0, 1)))
-        for level in differences(levels_of(flora, plants.take(slice(1, 2)), 0, like))[1:]:
+        for level in levels_of(flora, plants.take(slice(1, 2)), 0, like)[1:]:
             found["cover_error_max"] = max(found["cover_error_max"], abs(level.cover))
             found["color_error_max"] = max(found["color_error_max"], level.color)
             found["silhouette_px_max"] = max(found["silhouette_px_max"], level.outline)

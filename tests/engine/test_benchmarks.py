@@ -47,3 +47,22 @@ def test_commands_of_documents_exist(path: Path) -> None:
     for package, name in re.findall(r"-m (examples|devtools|benchmarks)\.([a-z_0-9]+)", text):
         assert package != "benchmarks", f"benchmarks.{name}: one runner, python -m benchmarks NAME"
         assert (ROOT / package / f"{name}.py").exists() or (ROOT / package / name / "__main__.py").exists(), name
+
+
+@pytest.mark.parametrize("path", sorted(BENCHMARKS.glob("*.py")), ids=lambda path: path.stem)
+def test_names_of_the_extension_that_it_imports_exist(path: Path) -> None:
+    """No other test runs what takes minutes, so a name that is gone would be missed by whoever measures next."""
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.ImportFrom) and (node.module or "").startswith("tetflora_addon"):
+            place = ROOT.joinpath(*node.module.split("."))
+            modules = {other.stem for other in place.iterdir()} if place.is_dir() else set()
+            assert {alias.name for alias in node.names} <= modules | _bound(place.with_suffix(".py")), node.module
+
+
+def _bound(source: Path) -> set[str]:
+    """Names that a module has, none where it is a package."""
+    tree = ast.parse(source.read_text(encoding="utf-8") if source.exists() else "")
+    found = {node.name for node in tree.body if isinstance(node, (ast.FunctionDef, ast.ClassDef))}
+    found |= {node.id for node in ast.walk(tree) if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store)}
+    imports = (node for node in ast.walk(tree) if isinstance(node, (ast.Import, ast.ImportFrom)))
+    return found | {alias.asname or alias.name for node in imports for alias in node.names}
