@@ -148,8 +148,7 @@ def _corrected(
     larger, tint = float(np.exp(size)), tuple((_mean_color(truth) / np.maximum(_mean_color(seen), 1e-9)).tolist())
     parts = _changed(plain, larger, tint)
     color = _mean_color(_views(grids, parts)) / _mean_color(truth)
-    pairs = zip(seen, truth, grids, strict=True)
-    outline = float(np.mean([one.outline_off(other) * grid.cell / pixel for one, other, grid in pairs]))
+    outline = _outlines(seen, truth, grids, pixel)
     return PlantLevel(parts, pixel, larger, tint, float(np.expm1(off)), float(np.abs(color - 1.0).max()), outline)
 
 
@@ -176,6 +175,12 @@ def _views(grids: list[Grid], parts: Parts) -> list[PlantView]:
 def _mean_color(views: list[PlantView]) -> Floats:
     """Mean color (3,) of what is covered in views."""
     return np.average([view.color for view in views], axis=0, weights=[max(view.cover, 1) for view in views])
+
+
+def _outlines(seen: list[PlantView], truth: list[PlantView], grids: list[Grid], pixel: float) -> float:
+    """How far outlines are off on average, in pixels."""
+    pairs = zip(seen, truth, grids, strict=True)
+    return float(np.mean([one.outline_off(other) * grid.cell / pixel for one, other, grid in pairs]))
 
 
 def _parts(flora: Flora, grown: list[WholeBranches], back: Floats, pixel: float = 0.0) -> Parts:
