@@ -42,7 +42,13 @@ def is_identifier(text: str) -> bool:
 
 
 def path_in(folder: Path, name: str) -> Path:
-    """The path of a file right in a folder; a name that leads anywhere else is an `OSError`."""
+    """The path of a file right in a folder.
+
+    Raises
+    ------
+    OSError
+        The name leads anywhere else.
+    """
     path = folder / name
     _refuse_nul(path)
     alone = name not in ("", ".", "..") and not set(name) & set("/\\:")
@@ -60,8 +66,17 @@ def is_regular(path: Path) -> bool:
 
 
 def read_whole(path: Path, most: int) -> bytes:
-    """The content of a regular file of at most so many bytes; it is an OSError if it cannot be read, is too large, or
-    is a link, folder, pipe or device.
+    """The content of a regular file.
+
+    Parameters
+    ----------
+    most : int
+        Bytes; a larger file is not read.
+
+    Raises
+    ------
+    OSError
+        It cannot be read, is too large, or is a link, folder, pipe or device.
     """
     _refuse_nul(path)
     before = os.lstat(path)
@@ -81,8 +96,13 @@ def read_whole(path: Path, most: int) -> bytes:
 def write_whole(path: Path, content: bytes | str) -> None:
     """Write a file beside its place and then put it there; text becomes UTF-8.
 
-    Readers in other processes see the old file or the new one, never a part of either; it is the old one if something
-    goes wrong. A link is replaced, and what it leads to stays as it is.
+    Readers in other processes see the old file or the new one, never a part of either. A link is replaced, and what it
+    leads to stays as it is.
+
+    Raises
+    ------
+    OSError
+        It cannot be written; an earlier file stays as it was.
     """
     _refuse_nul(path)
     part = path.with_name(uuid.uuid4().hex.join(PART))
@@ -99,7 +119,13 @@ def write_whole(path: Path, content: bytes | str) -> None:
 
 
 def replace(part: Path, path: Path) -> None:
-    """Put a file in the place of another; on Windows wait a moment for whoever has that open, as virus scanners do."""
+    """Put a file in the place of another one; on Windows wait a moment for whoever has that open, as virus scanners do.
+
+    Raises
+    ------
+    OSError
+        It cannot be put there.
+    """
     for wait in (*_WAITS, None):
         try:
             part.replace(path)
@@ -111,8 +137,7 @@ def replace(part: Path, path: Path) -> None:
 
 
 def parse_json(content: bytes | str, constant: Callable[[str], float] = float) -> Any:
-    """Decode JSON of which every part is a Python value that texts and floats can hold. It is a ValueError if it is
-    none, or a key comes twice in an object: Python's reader would take the last one and say nothing.
+    """Decode JSON of which every part is a Python value that texts and floats can hold.
 
     Integers beyond floats become infinite, so that whoever checks a number refuses it by the name of its key.
 
@@ -120,6 +145,11 @@ def parse_json(content: bytes | str, constant: Callable[[str], float] = float) -
     ----------
     constant : callable
         Makes numbers of ``NaN``, ``Infinity`` and ``-Infinity``, which JSON does not have.
+
+    Raises
+    ------
+    ValueError
+        It is no JSON, or a key comes twice in an object: Python's reader would take the last one and say nothing.
     """
     try:
         # Some editors begin a file with a mark of its encoding.

@@ -14,8 +14,12 @@ STEPS: dict[tuple[str, int], Callable[[dict[str, Any]], dict[str, Any]]] = {}
 
 
 def newest(what: str, data: dict[str, Any], number: object) -> dict[str, Any]:
-    """Data of an item of `FORMATS` in its newest format, from that of a number; a ValueError for one that this version
-    of TetFlora does not know.
+    """Data of an item of `FORMATS` in its newest format, from that of a number.
+
+    Raises
+    ------
+    ValueError
+        It has a number that this version of TetFlora does not know.
     """
     last = FORMATS[what]
     if isinstance(number, bool) or number not in range(1, last + 1):

@@ -60,8 +60,12 @@ def part_of(
 
 
 class Pace:
-    """How long a job works between two redraws, seconds: ``least`` where drawing takes no time, ``most`` where it takes
-    long, so that a window that takes long to draw is drawn less often.
+    """How long a job works between two redraws: a window that takes long to draw is drawn less often.
+
+    Parameters
+    ----------
+    least, most : float
+        Seconds of work where drawing takes no time, and where it takes long.
     """
 
     def __init__(self, least: float, most: float = _LONGEST) -> None:

@@ -72,8 +72,17 @@ def resident() -> int | None:
 
 
 def limit(max_memory: float) -> float:
-    """Bytes that the whole process may take, by `RefinementSettings.max_memory`: gigabytes, or 0 for half of the
-    machine's memory; infinite where that is not known.
+    """Bytes that the whole process may take.
+
+    Parameters
+    ----------
+    max_memory : float
+        `RefinementSettings.max_memory`: gigabytes, or 0 for half of the machine's memory.
+
+    Returns
+    -------
+    float
+        Infinite where neither the artist sets a limit nor the memory of the machine is known.
     """
     if max_memory > 0.0:
         return max_memory * GIGABYTE
@@ -87,8 +96,19 @@ def picture_bytes(pixels: int, denoised: bool = False) -> int:
 
 
 def allowance(max_memory: float, reserve: float = 0.0) -> float:
-    """Bytes that are left for results, in Blender and the renderer together, beside a reserve, see `picture_bytes`: at
-    least `LEAST`, and infinite without a limit. Of a process whose memory is not known the whole limit is left.
+    """Bytes that are left for results, in Blender and the renderer together.
+
+    Parameters
+    ----------
+    max_memory : float
+        As of `limit`.
+    reserve : float
+        Bytes that will be needed beside results, see `picture_bytes`.
+
+    Returns
+    -------
+    float
+        At least `LEAST`, and infinite without a limit. Of a process whose memory is not known the whole limit is left.
     """
     left = limit(max_memory) - (resident() or 0) - reserve
     return max(left, LEAST)

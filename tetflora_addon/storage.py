@@ -95,8 +95,19 @@ def cached(kind: str, content: str, shape: tuple[int, ...], compute: Callable[[]
 
 
 def clear(folder: Path | None = None, names: re.Pattern[str] | None = None) -> int:
-    """Delete all results of this user in the folder, or files of some names in another one, and nothing else that lies
-    there; returns how many there were. What cannot be deleted is a `TetFloraError`.
+    """Delete all results of this user in the folder, and nothing else that lies there; returns how many there were.
+
+    Parameters
+    ----------
+    folder : Path, optional
+        Another one than that which is used, for files of other names.
+    names : re.Pattern, optional
+        Of these.
+
+    Raises
+    ------
+    TetFloraError
+        Some cannot be deleted.
     """
     number, folder = 0, folder or _folder
     try:
@@ -142,8 +153,11 @@ def read_arrays(path: Path, most: int, checked: Callable[[Mapping[str, NDArray]]
 
 
 def refuse_packed(content: bytes, most: int) -> None:
-    """Refuse by a ValueError an archive that would take more memory than it has bytes: ours are not compressed, and say
-    their size.
+    """Refuse an archive that would take more memory than it has bytes: ours are not compressed, and say their size.
+
+    Raises
+    ------
+    ValueError
     """
     with zipfile.ZipFile(io.BytesIO(content)) as archive:
         for info in archive.infolist():
@@ -219,11 +233,15 @@ Arrays = tuple[NDArray, ...]
 
 
 def memoized(most_bytes: int) -> Callable[[Callable[..., Arrays]], Callable[..., Arrays]]:
-    """Decorator for functions that take arrays alone, and give arrays that follow from these alone: all results of the
-    function together may take so many bytes.
+    """Decorator for functions that take arrays alone, and give arrays that follow from these alone.
 
     Results are read only, for all who ask for the same get the same arrays. What nobody has asked for longest goes
     first; what is too large for the limit by itself is given, not kept, and makes nothing else go.
+
+    Parameters
+    ----------
+    most_bytes : int
+        That all results of the function together take.
     """
 
     def decorated(function: Callable[..., Arrays]) -> Callable[..., Arrays]:

@@ -153,7 +153,13 @@ SAMPLES_ABOVE = 64
 
 
 def compile_steps(source: AssetSource) -> Generator[float, None, Asset]:
-    """Compile an asset; yields the fraction that is done. It is a `TetFloraError` if it has no faces of any area."""
+    """Compile an asset; yields the fraction that is done.
+
+    Raises
+    ------
+    TetFloraError
+        It has no faces, or none of any area; the message names it.
+    """
     if not source.faces:
         raise TetFloraError(f'"{source.name}" has no faces to refine; add faces, or choose another object')
     patches = []

@@ -40,11 +40,6 @@ _ROUNDS = 6
 def classified(positions: Floats, corner_verts: Integers, face_offsets: Integers) -> tuple[Mask, Mask, Floats]:
     """Classify the faces of a mesh.
 
-    Components are connected faces. The width of a sheet is its area over its extent. That of a solid is 1 / H, with
-    Steiner's mean curvature H of polyhedra (half the sum of edge length × signed angle, over the area) averaged over
-    neighbors: 2 r for a long tube, r for a ball, no less for rough ground, where bumps and hollows cancel. Edges of
-    no, one or many faces, faces of no area and faces that touch themselves are all allowed.
-
     Parameters
     ----------
     positions : (v, 3) float64
@@ -59,6 +54,13 @@ def classified(positions: Floats, corner_verts: Integers, face_offsets: Integers
         Of a sheet that consists of few faces, and is one of many.
     width : (f,) float64
         Of the leaf, or the local thickness of the solid, in the unit of the positions.
+
+    Notes
+    -----
+    Components are connected faces. The width of a sheet is its area over its extent. That of a solid is 1 / H, with
+    Steiner's mean curvature H of polyhedra (half the sum of edge length × signed angle, over the area) averaged over
+    neighbors: 2 r for a long tube, r for a ball, no less for rough ground, where bumps and hollows cancel. Edges of
+    no, one or many faces, faces of no area and faces that touch themselves are all allowed.
     """
     faces = len(face_offsets) - 1
     if not faces:

@@ -133,8 +133,14 @@ class Camera:
         return np.max([distance / np.hypot(1.0, slope) for distance, slope in walls], axis=0)
 
     def widened(self, margin: float, margin_up: float | None = None) -> Self:
-        """The same camera with more around its image: a fraction of its width on the left and on the right, and of its
-        height, as large if it is not given, below and above.
+        """The same camera with more around its image.
+
+        Parameters
+        ----------
+        margin : float
+            Fraction of the image's width that is added on the left and on the right.
+        margin_up : float, optional
+            Fraction of its height that is added below and above; as ``margin`` if it is not given.
         """
         left, right, bottom, top = self.window
         # Whole pixels, so that the pixels of the image stay where they are.

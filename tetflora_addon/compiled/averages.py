@@ -560,8 +560,15 @@ def _mixed(summer: Floats, area: Floats, left: list[Floats], year: Table, hue: F
 def totals_of_day(
     rows: Table, species: Sequence[Species], season: seasons.Season, totals: Averages, leaf: RowLeaves
 ) -> tuple[Table, DayTotals] | None:
-    """Rows on a day, and totals of their sub-plants, from rows (r,), totals and leaves in summer; None where no plant
-    is other than in summer.
+    """Rows on a day, and totals of their sub-plants; None where no plant is other than in summer.
+
+    Parameters
+    ----------
+    rows : (r,) parameter table
+    totals : Averages
+        Of the same rows.
+    leaf : RowLeaves
+        Likewise.
     """
     if all(one.year is None for one in species):
         return None

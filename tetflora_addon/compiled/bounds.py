@@ -50,6 +50,8 @@ def _joint_turns(row: Table) -> Floats:
 def ring_stretch(rows: Table) -> Floats:
     """Greatest distance (r,) of a tube's vertices from its axis at joints, in radii.
 
+    Notes
+    -----
     A ring at a joint lies along the means of both segments' axes, made unit vectors. These need not be at right angles:
     between frames that a rotation by c separates, the cosine of their angle is at most (1 - cos c) / (3 + cos c),
     where the rotation's axis lies half way between them. A circle becomes an ellipse with the half axis √(1 + cosine).

@@ -531,8 +531,16 @@ _PLACES = {"species", "next", "drawn_rows", "sunlit", "dead"}
 
 
 def fingerprint(rows: Table, forms: Sequence[Sequence[LeafModel]], method: int) -> str:
-    """Hash of the rows of one species, and of the forms of its leaves by kind: 16 hexadecimal digits; ``method`` counts
-    the ways in which results were found so far.
+    """Hash of a species' parameters and the forms of its leaves: 16 hexadecimal digits.
+
+    Parameters
+    ----------
+    rows : (r,) parameter table
+        Of this species alone.
+    forms : by kind
+        Models of leaves.
+    method : int
+        Counts the ways in which results were found so far.
     """
     content = hashlib.sha256(f"{method}".encode())
     for name in sorted(set(rows.dtype.names) - _PLACES):

@@ -260,8 +260,12 @@ class Flora:
 
 
 def compile_species(species: Sequence[Species]) -> Flora:
-    """Compile the species of a scene; the last few results are kept, by content. It is a `SpeciesError` if a leaf is
-    still the name of a Blender object, which the bridge to Blender has to replace first.
+    """Compile the species of a scene; the last few results are kept, by content.
+
+    Raises
+    ------
+    SpeciesError
+        A species whose leaf is still the name of a Blender object (the bridge to Blender has to replace it first).
     """
     return _compiled(tuple(with_quality(with_habit(one, one.habit), one.quality) for one in species))
 

@@ -116,8 +116,12 @@ def known_crown(species: Species) -> Crown | None:
 
 
 def crown_of(species: Species) -> Crown:
-    """The mean crown of a species, which at the first time takes some tenths of a second; a `SpeciesError` if a leaf is
-    still the name of a Blender object.
+    """The mean crown of a species; its samples are drawn at the first time, which takes some tenths of a second.
+
+    Raises
+    ------
+    SpeciesError
+        A leaf is still the name of a Blender object.
     """
     found = _known.get(species)
     if found is None:
@@ -231,8 +235,12 @@ _reaches: "WeakKeyDictionary[Flora, dict[int, TwigReach]]" = WeakKeyDictionary()
 
 
 def measured(flora: Flora, seeds: Seeds) -> tuple[Floats, Floats]:
-    """Heights (n,) of plants, to the highest leaf or wood, and means (n,) of the extents of their crowns to east and
-    north, meters, about as plants are when all of them has grown.
+    """Heights of plants, to the highest leaf or wood, and means of the extents of their crowns to east and north.
+
+    Returns
+    -------
+    height, width : (n,) float64
+        Meters, about as plants are when all of them has grown.
     """
     height, width = np.zeros((2, len(seeds)))
 

@@ -124,10 +124,16 @@ def fit_to_budget(
 
 
 def relative_side(number: float, facet: float) -> float:
-    """Side of facets over that which is asked for, in pixels, where there would be so many primitives: 1, or less if
-    few.
+    """Side of facets over that which is asked for, where there would be so many primitives: 1, or less if few.
 
     What is asked to be coarser than *Final* is so in small images as well: they would take as long otherwise.
+
+    Parameters
+    ----------
+    number : float
+        Polygons and facets with the side that is asked for.
+    facet : float
+        That side, pixels.
     """
     few = PLENTY / max(facet / RefinementSettings().facet, 1.0) ** 2
     return float(np.clip(np.sqrt(number / few), 1.0 / FINEST, 1.0))

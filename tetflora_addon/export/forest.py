@@ -132,8 +132,14 @@ def identifiers(names: Sequence[str]) -> list[str]:
 
 @contextmanager
 def written_whole(path: Path) -> Iterator[Path]:
-    """A new folder beside a file, of which all goes to the file's folder when nothing went wrong, the file itself last;
-    else nothing does. What cannot be written is a `TetFloraError`, and an earlier file stays as it was.
+    """A new folder beside a file, of which all goes to the file's folder when nothing went wrong; else nothing does.
+
+    The file itself, which has the same name in the new folder, goes last.
+
+    Raises
+    ------
+    TetFloraError
+        Something cannot be written; an earlier file stays as it was.
     """
     part = path.with_name(uuid.uuid4().hex.join(PART))
     try:

@@ -72,8 +72,14 @@ class _Document:
 
 
 def write_gltf(path: Path, forest: Forest) -> Iterator[float]:
-    """Write a binary file; yields how much of it is done. It is an OSError if it cannot be written, and a
-    `TetFloraError` if it would be larger than such files can be.
+    """Write a binary file; yields how much of it is done.
+
+    Raises
+    ------
+    TetFloraError
+        It would be larger than such files can be.
+    OSError
+        It cannot be written.
     """
     with path.with_name(path.name + ".bin").open("wb+") as file:
         document = _Document(file)

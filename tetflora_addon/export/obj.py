@@ -17,8 +17,12 @@ from .forest import Forest
 
 
 def write_obj(path: Path, forest: Forest) -> Iterator[float]:
-    """Write a file, its materials (``.mtl``) and a table of plants (``.csv``), or raise an OSError; yields how much of
-    it is done.
+    """Write a file, its materials (``.mtl``) and a table of plants (``.csv``); yields how much of it is done.
+
+    Raises
+    ------
+    OSError
+        One of them cannot be written.
     """
     lines = []
     for surface in forest.surfaces:

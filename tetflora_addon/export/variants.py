@@ -35,8 +35,15 @@ class Variants(Arrays):
 
 
 def choose_variants(flora: Flora, seeds: Seeds, most: int) -> Variants:
-    """Choose variants for plants (n,), at most so many of each kind, of which the species of a flora are; where there
-    are no more plants than that, each is its own.
+    """Choose variants for plants.
+
+    Parameters
+    ----------
+    flora : Flora
+        Whose species are the kinds of the seeds.
+    seeds : Seeds of n
+    most : int
+        Variants of each kind. Where there are no more plants than that, each is its own.
     """
     variant, scale = np.zeros(len(seeds), np.int32), np.ones(len(seeds))
     plants: list[Integers] = []

@@ -47,8 +47,12 @@ class Trees:
 
 
 def heights_above(surface: Raster, ground: Raster, what: str) -> Raster:
-    """Heights of a surface above the ground, where both are known: a canopy of two elevation models. It is a
-    `SceneError` if nobody can tell where one lies on the other.
+    """Heights of a surface above the ground, where both are known: a canopy of two elevation models.
+
+    Raises
+    ------
+    SceneError
+        Nobody can tell where one lies on the other; ``what`` begins the message.
     """
     if (surface.system.epsg == 0) != (ground.system.epsg == 0):
         raise SceneError(f"{what}the coordinate system of one of the two rasters is not known; set Coordinate System")
@@ -67,8 +71,12 @@ def heights_above(surface: Raster, ground: Raster, what: str) -> Raster:
 
 
 def checked_canopy(values: Floats32, what: str) -> tuple[Floats32, list[str]]:
-    """Canopy heights without what no tree can be, and what is to be told of them; a `SceneError` if they are
-    elevations, or in another unit.
+    """Canopy heights without what no tree can be, and what is to be told of them.
+
+    Raises
+    ------
+    SceneError
+        They are elevations, or in another unit; ``what`` begins the message.
     """
     known = values[np.isfinite(values)]
     low, high = np.percentile(known, (1.0, 99.0)).tolist()
@@ -110,8 +118,16 @@ def without_areas(raster: Raster, areas: Sequence[Floats]) -> tuple[Raster, int]
 
 
 def find_trees(values: Floats32, cell: float, least: float) -> Job[Trees]:
-    """Find trees of at least some height in heights (h, w) above the ground, nan where nothing is known, of cells of
-    some side; all are meters. Yields progress.
+    """Find trees; yields progress.
+
+    Parameters
+    ----------
+    values : (h, w) float32
+        Heights above the ground, meters; nan where nothing is known.
+    cell : float
+        Side of a cell, meters.
+    least : float
+        Height of the smallest tree, meters.
     """
     width = values.shape[1]
     yield Progress(0.1, "Looking for treetops")

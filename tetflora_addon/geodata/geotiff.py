@@ -47,8 +47,14 @@ _PALETTE = 3
 
 
 def read_tiff(path: Path) -> Job[Raster]:
-    """Read a GeoTIFF, or a TIFF with a world file; yields progress. It is an OSError if it cannot be read, and a
-    `SceneError` that names the tag if it is broken, or of a kind that cannot be used.
+    """Read a GeoTIFF, or a TIFF with a world file; yields progress.
+
+    Raises
+    ------
+    OSError
+        It cannot be read.
+    SceneError
+        It is broken, or of a kind that cannot be used; names the tag.
     """
     check_regular(path)
     with path.open("rb") as file:

@@ -27,8 +27,14 @@ _RECORD, _FIRST, _LATER, _VALUE = 1024, 146, 170, 6  # of a USGS model: bytes, v
 
 
 def read_grid(path: Path) -> Job[Raster]:
-    """Read a raster of any of `ENDINGS` by what it holds; yields progress. It is an OSError if it cannot be read, and a
-    `SceneError` that names the line or tag if it is broken.
+    """Read a raster of any of `ENDINGS` by what it holds; yields progress.
+
+    Raises
+    ------
+    OSError
+        It cannot be read.
+    SceneError
+        It is broken; names the line or tag.
     """
     ending = path.suffix.lower()
     if ending in (".tif", ".tiff"):
@@ -165,8 +171,12 @@ def _usgs(path: Path) -> Raster:
 
 
 def mosaic(tiles: Sequence[Raster], names: Sequence[str]) -> Raster:
-    """Several tiles as one raster; where they overlap, the last that has a value counts. The first that is no tile of
-    one grid with the others is a `SceneError`.
+    """Several tiles as one raster; where they overlap, the last that has a value counts.
+
+    Raises
+    ------
+    SceneError
+        They are no tiles of one grid; names the first that is not.
     """
     first = tiles[0]
     if len(tiles) == 1:

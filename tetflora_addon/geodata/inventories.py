@@ -204,8 +204,7 @@ class Column(NamedTuple):
 def read_inventory(
     path: Path, epsg: int = 0, units: str = METRIC, skip: bool = False, columns: Mapping[str, str] | None = None
 ) -> Inventory:
-    """Read a file. It is an OSError if it cannot be read, and a `SceneError` that names line or feature, and column, if
-    it is broken.
+    """Read a file.
 
     Parameters
     ----------
@@ -218,14 +217,27 @@ def read_inventory(
     columns : mapping, optional
         What columns hold by their titles, for those that are not to be told by title and values: one of `FIELDS`, with
         a unit if the title does not name it, such as ``height ft``; empty for none.
+
+    Raises
+    ------
+    OSError
+        It cannot be read.
+    SceneError
+        It is broken; names line or feature, and column.
     """
     table_ = _table(path, skip, epsg=epsg)
     return _Reading(table_, units, skip, _chosen(table_, columns or {})).inventory(epsg)
 
 
 def preview(path: Path) -> list[Column]:
-    """Columns of a file as they are taken from its first rows. It is an OSError if it cannot be read, and a
-    `SceneError` if it is broken.
+    """Columns of a file as they are taken from its first rows.
+
+    Raises
+    ------
+    OSError
+        It cannot be read.
+    SceneError
+        It is broken.
     """
     table_ = _table(path, True, _PREVIEWED, PLAIN)
     taken = taken_for(table_, {})

@@ -60,8 +60,7 @@ class MapFeature:
 
 
 def read_outlines(path: Path, epsg: int = 0, kind: str = "") -> tuple[list[MapFeature], System, list[str]]:
-    """Read areas and lines of a file, and what is to be told of it; points are left out. It is an OSError if it cannot
-    be read, and a `SceneError` that names the feature if it is broken, or has no outlines.
+    """Read areas and lines of a file, and what is to be told of it; points are left out.
 
     Parameters
     ----------
@@ -69,6 +68,13 @@ def read_outlines(path: Path, epsg: int = 0, kind: str = "") -> tuple[list[MapFe
         As of `chosen_system`.
     kind : str
         What all are taken for; empty to tell them by their keys.
+
+    Raises
+    ------
+    OSError
+        It cannot be read.
+    SceneError
+        It is broken, or has no outlines; names the feature.
     """
     features, system = read_features(path, epsg)
     found: list[MapFeature] = []

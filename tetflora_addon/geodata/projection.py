@@ -394,7 +394,13 @@ def known_systems() -> dict[int, Definition]:
 
 
 def system_of(epsg: int, what: str = "") -> System:
-    """The system of an EPSG code; a `SceneError`, which says what to do, if it is not known here."""
+    """The system of an EPSG code, if it is known here.
+
+    Raises
+    ------
+    SceneError
+        It is none of those that are known here; says what to do.
+    """
     if epsg in known_systems():
         return System(epsg)
     raise SceneError(
@@ -465,8 +471,12 @@ class MapOrigin:
     north: float
 
     def local(self, points: Floats, system: System, what: str) -> Floats:
-        """Meters from the origin, (n, 2), of points (n, 2) of a system; a `SceneError` if nobody can tell where they
-        lie, or they are too far away.
+        """Meters from the origin, (n, 2), of points (n, 2) of a system.
+
+        Raises
+        ------
+        SceneError
+            Nobody can tell where they lie, or they are too far away; ``what`` begins the message.
         """
         local = self.offsets(points, system, what)
         far = np.abs(local).max(initial=0.0)
@@ -479,7 +489,13 @@ class MapOrigin:
         return local
 
     def offsets(self, points: Floats, system: System, what: str) -> Floats:
-        """The same of points however far; a `SceneError` if nobody can tell where they lie."""
+        """Meters from the origin, (n, 2), of points (n, 2) of a system, however far.
+
+        Raises
+        ------
+        SceneError
+            Nobody can tell where they lie; ``what`` begins the message.
+        """
         if (system.epsg == 0) != (self.system.epsg == 0):
             known, other = ("the scene", "the file") if system.epsg == 0 else ("the file", "the scene")
             raise SceneError(
@@ -494,8 +510,12 @@ MOST_AWAY = 250_000.0
 
 
 def place_about(system: System, low: Floats, high: Floats, what: str = "") -> MapOrigin:
-    """The place for a scene whose first data lie between two corners, (2,) each, in whole meters; a `SceneError` if
-    they are no places on Earth.
+    """The place for a scene whose first data lie between two corners, (2,) each; in whole meters.
+
+    Raises
+    ------
+    SceneError
+        They are no places on Earth.
     """
     middle = (np.asarray(low, np.float64) + high) / 2.0
     if system.metric or system.epsg == 0:

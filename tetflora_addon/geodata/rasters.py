@@ -106,7 +106,15 @@ def upright(dx: float, dy: float) -> tuple[Floats, Floats]:
 
 
 def check_regular(path: Path) -> None:
-    """Refuse folders, links, pipes and devices by a `SceneError`; it is an OSError where nothing can be looked at."""
+    """Refuse folders, links, pipes and devices.
+
+    Raises
+    ------
+    OSError
+        There is nothing, or it cannot be looked at.
+    SceneError
+        It is one of these.
+    """
     if not is_regular(path):
         with suppress(ValueError):  # a zero in its name
             path.lstat()
@@ -114,8 +122,12 @@ def check_regular(path: Path) -> None:
 
 
 def in_degrees(raster: Raster, what: str) -> Raster:
-    """A raster of which no file tells the system; its cells may be so small that they are degrees, and it is a
-    `SceneError` if nobody can tell.
+    """A raster of which no file tells the system; its cells may be so small that they are degrees.
+
+    Raises
+    ------
+    SceneError
+        Nobody can tell; ``what`` begins the message.
     """
     if raster.system != System() or not may_be_degrees(raster.outline):
         return raster
@@ -134,7 +146,13 @@ _DEGREES, _UNCLEAR = 0.003, 0.1  # cells: no ground is as fine in meters, or as 
 
 
 def checked_size(width: int, height: int, what: str) -> None:
-    """Refuse rasters that are too large, or have no cells, by a `SceneError`."""
+    """Refuse rasters that are too large, or have no cells.
+
+    Raises
+    ------
+    SceneError
+        ``what`` begins the message.
+    """
     if min(width, height) < 2 or max(width, height) > MAX_SIDE or width * height > MAX_CELLS:
         raise SceneError(
             f"{what}{width:,} by {height:,} cells; from 2 by 2 to {MAX_CELLS:,} in all can be read. Crop it, or "
@@ -143,8 +161,14 @@ def checked_size(width: int, height: int, what: str) -> None:
 
 
 def read_ascii(path: Path) -> Job[Raster]:
-    """Read an ASCII grid (Esri), whose coordinate system a file ``.prj`` beside it may name; yields progress. It is an
-    OSError if it cannot be read, and a `SceneError` that names the line if it is broken.
+    """Read an ASCII grid (Esri); yields progress. A file ``.prj`` beside it may name its coordinate system.
+
+    Raises
+    ------
+    OSError
+        It cannot be read.
+    SceneError
+        It is broken; names the line.
     """
     content = read_whole(path, MAX_TEXT)
     name, header, start = path.name, {}, 0
@@ -264,8 +288,14 @@ def system_beside(path: Path) -> System:
 
 
 def world_file(path: Path) -> list[Floats]:
-    """Middle of the first cell, and steps along and down, of the world file of an image. It is an OSError if it cannot
-    be read, and a `SceneError`, which names the line, if there is none or it is broken.
+    """Middle of the first cell, and steps along and down, of the world file of an image.
+
+    Raises
+    ------
+    OSError
+        It cannot be read.
+    SceneError
+        There is none, or it is broken; names the line.
     """
     ending = path.suffix.lower()
     endings = f"{ending[:2]}{ending[-1:]}w", f"{ending}w", ".wld"

@@ -54,8 +54,7 @@ class Table:
 
 
 def read_csv(path: Path, skip: bool = False, most: int | None = None) -> Table:
-    """Read separated values; the first line names the columns, or the second after one such as ``sep=;``. It is an
-    OSError if the file cannot be read, and a `SceneError` that names the line if it is broken.
+    """Read separated values; the first line names the columns, or the second after one such as ``sep=;``.
 
     Parameters
     ----------
@@ -63,6 +62,13 @@ def read_csv(path: Path, skip: bool = False, most: int | None = None) -> Table:
         Leave out rows with other numbers of values than the first line.
     most : int, optional
         Rows at most, for a preview.
+
+    Raises
+    ------
+    OSError
+        It cannot be read.
+    SceneError
+        It is broken; names the line.
     """
     content = read_whole(path, MAX_BYTES)
     name = path.name
@@ -110,8 +116,7 @@ def read_csv(path: Path, skip: bool = False, most: int | None = None) -> Table:
 
 
 def read_points(path: Path, _skip: bool = False, most: int | None = None, chosen: int = 0) -> Table:
-    """Points of a GeoJSON file with their properties; an area counts as its middle, lines do not count. Errors are
-    those of `read_features`.
+    """Points of a GeoJSON file with their properties; an area counts as its middle, lines do not count.
 
     Parameters
     ----------
@@ -119,6 +124,13 @@ def read_points(path: Path, _skip: bool = False, most: int | None = None, chosen
         Features at most, for a preview.
     chosen : int
         As of `read_features`.
+
+    Raises
+    ------
+    OSError
+        It cannot be read.
+    SceneError
+        It is broken; names the feature.
     """
     features, system = read_features(path, chosen)
     name, without = path.name, 0
@@ -165,8 +177,12 @@ def flat_tags(properties: dict[str, Any]) -> dict[str, Any]:
 
 
 def coordinates(values: Any, where: str, texts: bool = False) -> Floats:
-    """Positions of GeoJSON as (n, 2), or a `SceneError` if they are none; heights do not count, and numbers may be
-    texts if asked for.
+    """Positions of GeoJSON as (n, 2); heights do not count, and numbers may be texts if asked for.
+
+    Raises
+    ------
+    SceneError
+        They are no positions; ``where`` begins the message.
     """
     try:
         points = np.array([(x, y) for x, y, *_ in values], np.float64).reshape(-1, 2)
@@ -337,7 +353,13 @@ def _positions(values: object) -> list[list[float]]:
 
 
 def middle_of(points: Sequence[Sequence[float]]) -> tuple[float, float]:
-    """The centroid of a ring (n, 2), or the mean of less than three points; a ValueError if they are none."""
+    """The centroid of a ring (n, 2), or the mean of less than three points.
+
+    Raises
+    ------
+    ValueError
+        They are no points.
+    """
     ring = np.array([(x, y) for x, y, *_ in points], np.float64).reshape(-1, 2)
     if not np.isfinite(ring).all() or not len(ring):
         raise ValueError

@@ -28,8 +28,15 @@ _STEMS = 2.0
 
 
 def shaped_trunks(rows: Table, row: Integers, frame: Floats, forms: Floats) -> tuple[Floats32, Floats]:
-    """The column ``crown`` (n, 6) of trunks, and factors (n,) on their radii, from their frames (n, 3, 3) and crown
-    shapes (n, 6).
+    """The column ``crown`` (n, 6) of trunks, and factors (n,) on their radii.
+
+    Parameters
+    ----------
+    row : (n,) int
+    frame : (n, 3, 3) float64
+        Of the trunks.
+    forms : (n, 6) float64
+        Crown shapes.
     """
     own = np.where((rows["phantom"][row] | (rows["envelope"][row] > 0))[:, None], PLAIN, forms)
     stool = are_stools(rows, row)
@@ -110,8 +117,12 @@ def limb_count_factors(rows: Table, row: Integers, base: ArrayLike) -> Floats:
 
 
 def child_factors(rows: Table, parent: Branches, azimuth: Floats, sort: int) -> tuple[Floats, Floats]:
-    """Factors (m,) on the angles of children of a sort with their parents (m,), and on their lengths (m,), which the
-    form of these makes where they leave at azimuths (m,).
+    """What the form makes of children of a sort that leave parents (m,) at azimuths (m,).
+
+    Returns
+    -------
+    lean, length : (m,) float64
+        Factors on their angle with the parent, and on their length.
     """
     trunk, one = rows["order"][parent.row] == 0, np.ones(len(parent))
     light = parent.crown[:, LIGHT].astype(np.float64)
@@ -127,8 +138,15 @@ def child_factors(rows: Table, parent: Branches, azimuth: Floats, sort: int) -> 
 
 
 def handed_on(rows: Table, parent: Branches, sort: int, length: ArrayLike, azimuth: Floats, angle: Floats) -> Floats32:
-    """The column ``crown`` (m, 6) of children of a sort of parents (m,), with factors (m,) on their lengths, which are
-    turned by azimuths (m,) and angles (m,), see `growth.turned`.
+    """The column ``crown`` (m, 6) of children of a sort.
+
+    Parameters
+    ----------
+    parent : Branches of m
+    length : (m,) float64
+        Factors on the lengths of the children.
+    azimuth, angle : (m,) float64
+        By which they are turned, see `growth.turned`.
     """
     out = np.zeros((COLUMNS, len(parent)), np.float32)
     on_limbs = (sort == SPUR) & (rows["order"][parent.row] > 0)

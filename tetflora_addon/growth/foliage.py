@@ -107,8 +107,15 @@ def leaf_sites(
 
 
 def inclined(frame: Floats32, kind: Integers, key: Keys) -> Floats32:
-    """Frames (m, 3, 3) of leaves that stand by a distribution of `LEAF_INCLINATIONS`, (m,) or (1,), all around their
-    branch, of which frames (m, 3, 3) are given, and turned in their own plane.
+    """Frames (m, 3, 3) of leaves that stand by a distribution, all around their branch and turned in their own plane.
+
+    Parameters
+    ----------
+    frame : (m, 3, 3) float32
+        Of the branch where each leaf is.
+    kind : (m,) or (1,) int
+        Index into `LEAF_INCLINATIONS`.
+    key : (m,) uint64
     """
     number = uniform(key, Draw.LEAF_INCLINATION)
     angle = np.arccos(1.0 - number)  # of a sphere
@@ -363,8 +370,13 @@ def face_light(frame: NDArray[np.floating], light: Floats, sky: Floats) -> NDArr
 
 
 def settled(rows: Table, row: Integers, frame: NDArray[np.floating], light: Floats, sky: Floats) -> NDArray:
-    """Leaf frames as they are in the end: turned to the light as by `face_light`, then hanging, as far as orders of
-    rows (n,) or (1,) ask for.
+    """Leaf frames as they are in the end: turned to the light, then hanging, as far as their orders ask for.
+
+    Parameters
+    ----------
+    row : (n,) or (1,) int
+    frame, light, sky
+        As for `face_light`.
     """
     frame = face_light(frame, light, sky)
     droop = rows["leaf_droop"][row]

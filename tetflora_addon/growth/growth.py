@@ -332,8 +332,15 @@ class WholeBranches(Arrays):
     lines: Axes  # of the same n
 
     def knots(self, rows: Table) -> tuple[Integers, Floats, Floats]:
-        """Where segments begin and end, from base to tip of each branch: its index (m,), fractions (m,) of its axis,
-        and places (m, 3); a flared base has some more.
+        """Where segments begin and end; a flared base has some more.
+
+        Returns
+        -------
+        owner : (m,) int64
+            Branch of each place, in order; those of a branch from base to tip.
+        t : (m,) float64
+            Fraction of its axis.
+        position : (m, 3) float64
         """
         rings = rows["rings"][self.branches.row]
         owner, index = spread(self.lines.segments + rings + 1)

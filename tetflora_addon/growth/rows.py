@@ -314,8 +314,12 @@ class DrawnLines:
 
 
 def drawn_lines(branches: DrawnBranches) -> DrawnLines:
-    """Drawn branches with even segments, as many as they have themselves, at most `MAX_SEGMENTS`; a `SpeciesError` if
-    there are more than `MAX_DRAWN`.
+    """Drawn branches with even segments, as many as they have themselves, at most `MAX_SEGMENTS`.
+
+    Raises
+    ------
+    SpeciesError
+        More than `MAX_DRAWN` branches.
     """
     number = len(branches)
     if number > MAX_DRAWN:
@@ -666,8 +670,23 @@ def _exact(some: Order | Dead) -> Order | Dead:
 
 
 def ranged(rows: Table, name: str, row: Integers, key: Keys, draw: int) -> NDArray:
-    """Value (n,) of a range of `ROW_DTYPE` for branches of rows (n,) with keys (n,): mean + variation × a signed random
-    number, see `hashing.Draw`. A row (1,) stands for all, and the value is (1,) where it is the same for these.
+    """Value of one parameter for each branch: mean + variation × a signed random number of its key.
+
+    Parameters
+    ----------
+    rows : table of `build_rows`
+    name : str
+        A range of `ROW_DTYPE`.
+    row : (n,) int
+        Or (1,), which stands for all.
+    key : (n,) uint64
+    draw : int
+        See `hashing.Draw`.
+
+    Returns
+    -------
+    (n,) float64
+        Or (1,) where it is the same for all of one row.
     """
     return varied(rows[name][row], key, draw)
 

@@ -45,9 +45,12 @@ it is in summer; and the parts of the last that have the fresh color, those of a
 
 @dataclass(frozen=True)
 class Season:
-    """A day of the year at a place, or a `TetFloraError` for a number that is none or is out of its limits.
+    """A day of the year at a place. Fields with a label are properties of a scene, and documented by their tooltips.
 
-    Fields with a label are properties of a scene, and documented by their tooltips.
+    Raises
+    ------
+    TetFloraError
+        A number that is none or is out of its limits.
     """
 
     day: float = setting(
@@ -152,8 +155,13 @@ def _numbers(leaf: LeafYear) -> np.void:
 
 
 def plant_years(rows: Table, row: Integers, key: Keys) -> Floats | None:
-    """The day that it is for plants, by rows of their trunks (n,) and keys (n,), and where they stand among autumn
-    colors, 0 to 1: (n, 2); None without seasons.
+    """The day that it is for plants (n, 2), and where they stand among autumn colors, 0 to 1; None without seasons.
+
+    Parameters
+    ----------
+    row : (n,) int
+        Of their trunks.
+    key : (n,) uint64
     """
     if not is_seasonal(rows):
         return None

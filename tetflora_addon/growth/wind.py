@@ -70,10 +70,12 @@ sine of leaves' turns in a wind without gusts, ``flutter_rate`` their frequency,
 
 @dataclass(frozen=True)
 class Wind:
-    """A wind at a moment, or a `TetFloraError` for a number that is none, a negative speed or loop, or gusts outside 0
-    to 1.
+    """A wind at a moment. Fields with a label are properties of a scene, and documented by their tooltips.
 
-    Fields with a label are properties of a scene, and documented by their tooltips.
+    Raises
+    ------
+    TetFloraError
+        A number that is none, a negative speed or loop, or gusts outside 0 to 1.
     """
 
     speed: float = setting(

@@ -297,8 +297,19 @@ def closed_parts(model: LeafModel) -> Integers:
 
 
 def rounded(model: LeafModel, times: int) -> tuple[LeafModel, float]:
-    """A model whose closed parts are divided so many times, by which a triangle becomes four, each part with the area
-    that it had; and how far the middles of its edges are from the round surface, about, in units of the leaf's size.
+    """A model whose closed parts are divided so many times, each with the area that it had.
+
+    Parameters
+    ----------
+    times : int
+        Each makes four faces of a triangle.
+
+    Returns
+    -------
+    LeafModel
+        Triangles where parts are closed, and the faces of all others.
+    error : float
+        How far the middles of its edges are from the round surface, about, in units of the leaf's size.
     """
     of_face = closed_parts(model)
     chosen = np.flatnonzero(of_face >= 0)
@@ -407,8 +418,19 @@ _BARE = 0.08
 
 
 def spined(model: LeafModel, spines: Spines, part: Integers) -> tuple[LeafModel, Floats32]:
-    """A model with spines and areoles on its closed parts, (f,) of `bodies.closed_parts`, after its own faces; and what
-    the color of the leaf is times that of each face, (f, 3).
+    """A model with spines on it.
+
+    Parameters
+    ----------
+    part : (f,) int64
+        Its `bodies.closed_parts`, on which spines stand.
+
+    Returns
+    -------
+    LeafModel
+        Spines and areoles come after its own faces.
+    tint : (f, 3) float32
+        What the color of the leaf is times that of each face.
     """
     place, normal = _areoles(model, part, spines.distance)
     height, wide = (spines.distance * size for size in _CUSHION)

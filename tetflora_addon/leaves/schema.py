@@ -20,7 +20,13 @@ LEAF_KEYS = ("model", "object", "vertices", "faces", "uv", "outline", "spines")
 
 
 def read_forms(reader: FileReader, data: Any, key: str) -> tuple[LeafModel | str, ...]:
-    """A leaf, or a list of forms among which each leaf has one by chance."""
+    """A leaf, or a list of forms among which each leaf has one by chance.
+
+    Raises
+    ------
+    SpeciesError
+        Names the field and what it may be.
+    """
     if not isinstance(data, list):
         return (_read_leaf(reader, data, key),)
     if not 1 <= len(data) <= MAX_FORMS:
@@ -85,7 +91,13 @@ def _is_list_of_points(value: Any, size: int) -> bool:
 
 
 def read_outline(reader: FileReader, data: Any, where: str) -> Blade | Needles | Compound:
-    """An outline from what a species file has for it."""
+    """An outline from what a species file has for it.
+
+    Raises
+    ------
+    SpeciesError
+        Names the field and what it may be.
+    """
     kind = "blade"
     if isinstance(data, dict) and "kind" in data:
         kind = reader.choice(data["kind"], f"{where}.kind", tuple(OUTLINES))

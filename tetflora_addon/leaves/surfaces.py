@@ -306,7 +306,13 @@ def outline(blade: Blade, tolerance: float = FINEST) -> Floats:
 
 
 def check_outline(blade: Blade) -> None:
-    """Refuse outlines that cross themselves by a `SpeciesError` that names what may be changed."""
+    """Refuse outlines that cross themselves.
+
+    Raises
+    ------
+    SpeciesError
+        Names what may be changed.
+    """
     if crossings(outline(blade, 0.002)):
         raise SpeciesError(
             "the outline crosses itself; use a smaller tooth_size or lobe_depth, fewer teeth, or a rounded base"
@@ -329,8 +335,14 @@ def crossings(points: Floats) -> int:
 
 
 def blade_surface(blade: Blade, tolerance: float, amount: float = 1.0) -> LeafSurface:
-    """A blade as polygons, in units of the whole leaf's length; the tolerance of its outline is in lengths of the
-    blade, and ``amount``, 0 to 1, is how much its variants differ.
+    """A blade as polygons, in units of the whole leaf's length.
+
+    Parameters
+    ----------
+    tolerance : float
+        Of the outline, in lengths of the blade.
+    amount : float
+        How much its variants differ, 0 to 1.
     """
     step = _STEP * np.sqrt(tolerance)
     rows = max(int(np.ceil(1.0 / step)), 1)

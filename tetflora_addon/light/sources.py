@@ -56,8 +56,21 @@ def _disk_points() -> tuple[Floats, Floats]:
 
 
 def arriving(light: Light, points: Floats) -> tuple[Floats, Floats]:
-    """Unit vectors (m, 3) from points (m, 3), meters, to a light, and the irradiance (m, 3) on a surface that faces it
-    where nothing blocks it, W/m², linear RGB. An area counts as the point in its middle, see `split_areas`.
+    """Unblocked light at points.
+
+    Parameters
+    ----------
+    light : Light
+        An area counts as the point in its middle, see `split_areas`.
+    points : (m, 3) float64
+        Meters.
+
+    Returns
+    -------
+    toward : (m, 3) float64
+        Unit vectors to the light.
+    irradiance : (m, 3) float64
+        W/m² on a surface that faces the light, linear RGB.
     """
     if light.kind == "SUN":
         return np.tile(-light.direction, (len(points), 1)), np.tile(light.color, (len(points), 1))

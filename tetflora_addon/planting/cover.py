@@ -72,8 +72,14 @@ class Sheet:
         return bilinear(values.reshape(self.rows, self.columns), (points - self.low) / self.cell - 0.5)
 
     def pairs(self, middle: Floats, reach: Floats) -> Iterator[tuple[Integers, Integers, Floats]]:
-        """Cells whose middles may lie within a reach (n,) of points (n, 2), some points at a time: point (m,) and cell
-        (m,) of each pair, and the way (m, 2) from the one to the middle of the other, meters.
+        """Cells whose middles may lie within a reach (n,) of points (n, 2), some points at a time.
+
+        Yields
+        ------
+        owner, cell : (m,) int64
+            Point and cell of each pair.
+        away : (m, 2) float64
+            From the point to the middle of the cell, meters.
         """
         size = (self.columns, self.rows)
         first = np.clip(np.ceil((middle - reach[:, None] - self.low) / self.cell - 0.5), 0, size).astype(np.int64)
@@ -187,8 +193,14 @@ class Floor:
     fallen: Floats  # (species, cells): leaves that fall, m² on a square meter
 
     def suits(self, habitat: Habitat, species: int | None, seed: int) -> Suits:
-        """How suitable places are for a habitat of what a species sheds, anything if it is None, nothing that stands if
-        -1; the seed is of the patches.
+        """How suitable places are for a habitat.
+
+        Parameters
+        ----------
+        species : int or None
+            What sheds it; anything if None, nothing that stands if -1.
+        seed : int
+            Of the patches.
         """
         size, keeps = habitat.value
         key = child_key(key_of_seed(seed), _PATCHES + list(Habitat).index(habitat))

@@ -160,14 +160,7 @@ def place(
     suits: Mapping[int, Suits] | None = None,
     zones: Sequence[Zone] = (),
 ) -> Placement:
-    """Scatter plants over the ground as the rules ask, evenly as seen on a map. It is a `SceneError`, which names the
-    setting and what to do, if no ground is suitable, or the rules contradict themselves.
-
-    Places are drawn by hashes of the seed and of their number, and kept as often as they are suitable (rejection
-    sampling); those that are kept first come first (dart throwing: R. Cook, "Stochastic sampling in computer graphics",
-    1986). By density, as many places are drawn as would stand on wholly suitable ground. By count, more are drawn, in a
-    bounded number of rounds, until there are enough. Where species seek or shun each other, or some ground suits one
-    better than another, they are placed one after the other, each with its fraction of the count.
+    """Scatter plants over the ground as the rules ask, evenly as seen on a map.
 
     Parameters
     ----------
@@ -179,6 +172,19 @@ def place(
         How suitable the ground is for a species (index into the weights), besides what the rules say of all.
     zones : sequence of Zone
         Of the ground's triangles; how suitable the ground is, besides, is the product of their shares.
+
+    Raises
+    ------
+    SceneError
+        No ground is suitable, or the rules contradict themselves; names the setting and what to do.
+
+    Notes
+    -----
+    Places are drawn by hashes of the seed and of their number, and kept as often as they are suitable (rejection
+    sampling); those that are kept first come first (dart throwing: R. Cook, "Stochastic sampling in computer graphics",
+    1986). By density, as many places are drawn as would stand on wholly suitable ground. By count, more are drawn, in a
+    bounded number of rounds, until there are enough. Where species seek or shun each other, or some ground suits one
+    better than another, they are placed one after the other, each with its fraction of the count.
     """
     check_rules(rules)
     older = np.zeros((0, 2)) if older is None else np.asarray(older, dtype=np.float64)[:, :2]

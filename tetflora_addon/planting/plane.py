@@ -261,8 +261,14 @@ _BARE, _FULL = -0.1, 0.25  # values of the noise below which nothing grows, and 
 
 
 def gradient_noise(points: Floats, key: Keys) -> Floats:
-    """Smooth noise (n,) with mean 0 between -1 and 1 at points (n, 2) in cells of a lattice, which has a key (K.
-    Perlin, "Improving noise", SIGGRAPH 2002, in two dimensions).
+    """Smooth noise with mean 0 between -1 and 1 (K. Perlin, "Improving noise", SIGGRAPH 2002, in two dimensions).
+
+    Parameters
+    ----------
+    points : (n, 2) float64
+        In cells of the lattice.
+    key : uint64
+        Of the whole lattice.
     """
     corner = np.floor(points)
     part = points - corner
@@ -325,7 +331,15 @@ class Terrain:
     border: Floats | None = None
 
     def __post_init__(self) -> None:
-        """Refuse by a `SceneError` what cannot be stood on: no triangles, or some with places that are no numbers."""
+        """Refuse what cannot be stood on.
+
+        Raises
+        ------
+        SceneError
+            No triangles, or some with places that are no numbers.
+        ValueError
+            Arrays that do not fit each other: a mistake of the caller, not of the artist.
+        """
         count = len(self.triangles)
         if not count:
             raise SceneError("The ground has no faces; select a mesh with faces")

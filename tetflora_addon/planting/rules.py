@@ -181,7 +181,13 @@ _NOT_NEGATIVE = (
 
 
 def check_rules(rules: Rules) -> None:
-    """Look through all rules, and refuse the first that cannot be by a `SceneError`."""
+    """Look through all rules.
+
+    Raises
+    ------
+    SceneError
+        The first that cannot be.
+    """
     labels = {one.name: one.metadata.get("name", "Density") for one in fields(rules)}
     for name in _NOT_NEGATIVE:
         value = getattr(rules, name)

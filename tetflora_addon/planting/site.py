@@ -175,8 +175,12 @@ class Site:
     """Ground that suits the rules, ready to draw places on."""
 
     def __init__(self, ground: Terrain, rules: Rules, zones: Sequence[Zone] = ()) -> None:
-        """Leave out triangles where nothing can grow; plants get what all of the zones of the ground leave, and a
-        `SceneError` names the setting that leaves nothing.
+        """Leave out triangles where nothing can grow; plants get what all of the zones of the ground leave.
+
+        Raises
+        ------
+        SceneError
+            Nothing is left; names the setting that leaves nothing.
         """
         self.ground, self.rules, self.zones = ground, rules, tuple(zones)
         self._key = child_key(key_of_seed(rules.seed), _CLUMPS)

@@ -116,6 +116,11 @@ def paint(brush: Brush, center: Sequence[float], standing: Floats, key: Keys, da
     places : (n, 2) float64
     keys : (n,) uint64
         One for each place; `individuals` makes plants of them.
+
+    Raises
+    ------
+    ValueError
+        `too_many` cells.
     """
     side = cell_size(brush.density)
     middle = np.asarray(center, float)[:2]

@@ -69,8 +69,19 @@ def cell_for(triangles: Floats, finest: float, most: int) -> float:
 
 
 def height_grid(triangles: Floats, cell: float) -> HeightGrid:
-    """Heights of the highest of triangles (t, 3, 3) in cells of a width, meters, world space; walls do not count, and
-    more than `MOST_CELLS` are a `SceneError`.
+    """Heights of the highest of all triangles.
+
+    Parameters
+    ----------
+    triangles : (t, 3, 3) float64
+        Corners, meters in world space; walls, which have no area on the map, do not count.
+    cell : float
+        Meters.
+
+    Raises
+    ------
+    SceneError
+        More than `MOST_CELLS`.
     """
     flat = triangles[..., :2].reshape(-1, 2)
     first = np.floor(flat.min(axis=0) / cell)
@@ -157,6 +168,8 @@ _AROUND = tuple((i, j, float(np.hypot(i, j))) for i in (-1, 0, 1) for j in (-1, 
 def filled(height: Floats, cell: float) -> Floats:
     """Ground (h, w) without hollows, meters: each cell falls toward the border or toward NaN, from where water leaves.
 
+    Notes
+    -----
     All is flooded, and the flood sinks until each cell is as high as its ground, or a hair above its lowest neighbor.
     Rows are swept to and fro, then columns; the result does not depend on that.
     """
@@ -195,6 +208,8 @@ def catchment(surface: Floats, cell: float) -> Floats:
 
     Cells without a lower neighbor are outlets. All of the area arrives at these.
 
+    Notes
+    -----
     A cell is done when all that flow into it are: as many rounds as the longest way of water has cells, each with only
     the cells that it finishes. What arrives is summed in the order of neighbors, so the result is the same anywhere.
     """

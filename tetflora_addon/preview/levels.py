@@ -188,6 +188,11 @@ def colors_of(level: Level, mode: str, deepest: int) -> Floats32:
         changed.
     deepest : int
         Depth of the brightest color: colors stay from level to level.
+
+    Raises
+    ------
+    ValueError
+        If there is no such mode.
     """
     if mode == "LEVEL":
         return ramp(level.depth / max(deepest, 1))
@@ -264,6 +269,11 @@ def project(vertices: Floats, extinction: Floats, camera: Camera) -> Projected:
         κ ≥ 0, 1/m.
     camera : Camera
         Perspective or orthographic; panoramas have no straight edges.
+
+    Raises
+    ------
+    ValueError
+        If the camera is a panorama.
     """
     vertices = np.asarray(vertices, np.float64)
     gradients = barycentric_gradients(vertices)

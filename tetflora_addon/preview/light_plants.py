@@ -230,8 +230,12 @@ def bounds_of_plants(flora: Flora, seeds: Seeds, most: int = MOST_PLANTS) -> Sha
 
 
 def thinned(seeds: Seeds, heights: Floats, most: int = MOST_PLANTS) -> Seeds:
-    """At most so many plants, in proportion to how large they look by the heights (s,) of their kinds, meters: of a
-    meadow under trees the grass is thinned.
+    """At most so many plants, in proportion to how large they look: of a meadow under trees the grass is thinned.
+
+    Parameters
+    ----------
+    heights : (s,) float64
+        Of each kind, meters.
     """
     if len(seeds) <= most:
         return seeds

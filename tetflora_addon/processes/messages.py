@@ -37,7 +37,13 @@ class Packed:
 
 
 def send(stream: BinaryIO, *things: object) -> None:
-    """Write objects, or what is packed already, as one message; `Closed` or an OSError if the receiver has ended."""
+    """Write objects, or what is packed already, as one message.
+
+    Raises
+    ------
+    Closed, OSError
+        The receiver has ended.
+    """
     if stream.closed:
         raise Closed
     packed = [thing if isinstance(thing, Packed) else Packed(thing) for thing in things]

@@ -80,8 +80,7 @@ tell: Callable[[str], object] = _print
 def in_processes(
     function: Callable[[_Shared, _Item], _Result], shared: _Shared, items: Iterable[_Item], worth: bool = True
 ) -> Iterator[_Result]:
-    """Results of ``function(shared, item)`` for items, in their order, made on all cores; what the function raises
-    comes where its result would.
+    """Results of ``function(shared, item)`` for items, in their order, made on all cores.
 
     Parameters
     ----------
@@ -93,6 +92,11 @@ def in_processes(
         No more are taken ahead than there are threads.
     worth : bool
         Whether this is work enough for other processes.
+
+    Raises
+    ------
+    Exception
+        Whatever the function raises, where its result would come.
     """
     if not worth or parallel.within() or not number():
         yield from (function(shared, item) for item in items)
@@ -211,8 +215,12 @@ class _Child:
         self.peak = 0
 
     def greet(self) -> bool:
-        """Wait until it is there, a `_StartError` if it never was; whether it still is: it ends by itself when there is
-        nothing to do.
+        """Wait until it is there; whether it still is: it ends by itself when there is nothing to do.
+
+        Raises
+        ------
+        _StartError
+            It never was.
         """
         if not self._ready:
             timer = threading.Timer(_PATIENCE, self.kill)
@@ -246,7 +254,13 @@ class _Child:
         return answer
 
     def forget(self) -> None:
-        """Let go of what no call will need again; `Closed` or an OSError if the process has ended."""
+        """Let go of what no call will need again.
+
+        Raises
+        ------
+        Closed, OSError
+            The process has ended.
+        """
         for number in [number for number, given in self._known.items() if given.forgotten]:
             del self._known[number]
             send(self._process.stdin, "forget", number)

@@ -131,8 +131,12 @@ def unmeasured(flora: Flora) -> list[int]:
 
 
 def measuring(flora: Flora, species: Collection[int]) -> Generator[tuple[str, float], None, None]:
-    """Measure weights that are not known yet, so that `facet_weights` has them; yields the name of the species at work,
-    and the fraction of its measurement that is done.
+    """Measure weights that are not known yet; `facet_weights` has them afterward.
+
+    Yields
+    ------
+    str, float
+        Name of the species at work, and the fraction of its measurement that is done.
     """
     for number in sorted(set(species)):
         left = [variant for variant in needed(flora, number) if _known(*variant) is None]
@@ -491,8 +495,18 @@ def needed(flora: Flora, number: int) -> list[tuple[Flora, int]]:
 
 
 def weights_of(flora: Flora, number: int, states: tuple[int, ...], known: Known) -> Floats:
-    """Weights (2, s, r, k) of a species (index) of a flora in summer, in some states (indices of `SHARES`), from what
-    was measured of those that are `needed`; 1 in the others.
+    """Weights (2, s, r, k) of a species of a flora in summer, in some states; 1 in the others.
+
+    Parameters
+    ----------
+    flora : Flora
+        In summer.
+    number : int
+        Index of the species.
+    states : tuple of int
+        Indices of `SHARES`.
+    known : callable
+        What was measured of those that are `needed`.
     """
     own, rows = flora.species[number], flora.rows[flora.rows["species"] == number]
     out = np.ones((2, max(states) + 1, len(rows), len(COUNTS)))

@@ -75,6 +75,8 @@ class Terminals(Arrays):
 def mean_extinction(totals: Totals, volumes: Floats) -> Floats:
     """Extinction κ (n,) of tetrahedra in 1/m, as if surfaces faced all ways.
 
+    Notes
+    -----
     Randomly turned, a leaf shows half its one-sided area and a closed branch a quarter of its surface (Cauchy 1832).
     """
     return (totals.leaf_area / 2 + totals.wood_area / 4) / volumes
@@ -91,6 +93,8 @@ def decide(cells: Terminals, transmittance: Floats, settings: RefinementSettings
 
     ``transmittance`` (n,) is the fraction of each one's light that nothing in front blocks; 0 out of view.
 
+    Notes
+    -----
     A tetrahedron's *contribution* is the number of pixels that its contents change: its pixels × the fraction of them
     that is not hidden × its own opacity. Of leaves wider than ``leaf_limit`` pixels some are drawn as leaves. A
     tetrahedron full of them is divided down to ``block`` pixels to find its hidden parts, and in depth until they are

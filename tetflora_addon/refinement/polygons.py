@@ -251,8 +251,15 @@ class Polygons(Arrays):
         return np.where(self.part >= 0, 1, self.meshes.face_size[self.face] - 2)
 
     def triangles(self) -> tuple[Integers, Integers, Floats]:
-        """Triangles of whole faces, and fragments, in the order of the polygons: polygon (k,) and triangle (k,) of
-        each, and the fraction (k,) of the triangle's area, 1 except for fragments.
+        """Triangles of whole faces, and fragments, in the order of the polygons.
+
+        Returns
+        -------
+        owner : (k,) int64
+            Polygon that each belongs to.
+        triangle : (k,) int64
+        fraction : (k,) float64
+            Of the triangle's area; 1 except for fragments.
         """
         cut = self.part >= 0
         owner, index = spread(self.triangle_counts)

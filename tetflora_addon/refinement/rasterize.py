@@ -65,9 +65,6 @@ def pixel_rays(camera: Camera, width: int, height: int) -> tuple[Floats, Floats]
 def tetrahedron_fragments(vertices: Floats, camera: Camera, width: int, height: int) -> Fragments:
     """What the rays through the pixels' centers meet of each tetrahedron.
 
-    A tetrahedron of few pixels (`SMALL`) has its silhouette's area as coverage, divided among its fragments, and its
-    mean chord V / A as thickness: Σ coverage · thickness over all pixels is its volume, per area of a pixel.
-
     Parameters
     ----------
     vertices : (n, 4, 3) float64
@@ -80,6 +77,11 @@ def tetrahedron_fragments(vertices: Floats, camera: Camera, width: int, height: 
     Fragments
         One for each pixel whose ray goes through a tetrahedron. One that lies in view between the pixels' centers has
         a single fragment, in the pixel of its projected centroid. One out of view has none.
+
+    Notes
+    -----
+    A tetrahedron of few pixels (`SMALL`) has its silhouette's area as coverage, divided among its fragments, and its
+    mean chord V / A as thickness: Σ coverage · thickness over all pixels is its volume, per area of a pixel.
     """
 
     def drawn(block: slice) -> Fragments:

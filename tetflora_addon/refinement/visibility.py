@@ -71,6 +71,16 @@ class AlphaBuffer:
         Where each pixel's ray ends at an opaque polygon, as `occluder_depth` gives it for the same size.
     pixel_weight : (height · width,) float64, optional
         Pixels of the final image that each pixel stands for, where the image is not the camera's own.
+
+    Attributes
+    ----------
+    width, height : int
+        Size of the buffer, pixels.
+
+    Raises
+    ------
+    ValueError
+        If the occluders were drawn for a buffer of another size.
     """
 
     def __init__(
@@ -246,8 +256,16 @@ def pixels_per_solid_angle(camera: Camera, directions: Floats) -> Floats:
 
 
 class PanoramaBuffer:
-    """The fragments of all tetrahedra around the eye of a panorama, before opaque triangles (t, 3, 3), meters, on six
-    faces of so many pixels a side; to be used as an `AlphaBuffer`.
+    """The fragments of all tetrahedra around the eye; to be used as an `AlphaBuffer`.
+
+    Parameters
+    ----------
+    camera : Camera
+        A panorama.
+    side : int
+        Of each of the six faces, pixels.
+    occluders : (t, 3, 3) float64, optional
+        Opaque triangles, meters.
     """
 
     def __init__(self, camera: Camera, side: int, occluders: Floats | None = None) -> None:

@@ -82,8 +82,21 @@ def _read_leaf_year(reader: FileReader, data: Any, name: str) -> LeafYear:
 
 
 def species_from_dict(data: Any, identifier: str, source: str) -> Species:
-    """Check what `json.load` gave of a species file and turn it into a `Species`, to which plants refer by an
-    identifier; a `SpeciesError` names the source, usually the file's path, the key and what is allowed.
+    """Check a decoded species file and turn it into a `Species`.
+
+    Parameters
+    ----------
+    data : object
+        What `json.load` gave.
+    identifier : str
+        Name by which plants refer to the species.
+    source : str
+        Named in errors, usually the file's path.
+
+    Raises
+    ------
+    SpeciesError
+        Names the source, the key and what is allowed.
     """
     reader = FileReader(source)
     if not isinstance(data, dict):
@@ -129,7 +142,13 @@ def species_from_dict(data: Any, identifier: str, source: str) -> Species:
 
 
 def species_from_json(content: bytes | str, identifier: str, source: str) -> Species:
-    """Check the text of a species file, as `species_from_dict` checks what it decodes to, or that it is JSON at all."""
+    """Check the text of a species file, as `species_from_dict` checks what it decodes to.
+
+    Raises
+    ------
+    SpeciesError
+        It is not JSON, or breaks a rule of the format.
+    """
     try:
         data = parse_json(content)
     except ValueError as error:
@@ -138,12 +157,24 @@ def species_from_json(content: bytes | str, identifier: str, source: str) -> Spe
 
 
 def read_species(path: Path) -> Species:
-    """Read and check one species file; whatever is wrong with it is a `SpeciesError`."""
+    """Read and check one species file.
+
+    Raises
+    ------
+    SpeciesError
+        The file cannot be read, is not JSON, or breaks a rule of the format.
+    """
     return species_from_json(species_file(path), path.stem, path.name)
 
 
 def species_file(path: Path) -> bytes:
-    """The content of a species file; a `SpeciesError` if it cannot be read."""
+    """The content of a species file.
+
+    Raises
+    ------
+    SpeciesError
+        It cannot be read.
+    """
     try:
         return read_whole(path, MAX_FILE_BYTES)
     except OSError as error:
@@ -206,7 +237,13 @@ def stamp(path: Path) -> tuple[int, int]:
 
 
 def checked_identifier(text: str) -> str:
-    """An identifier of a species, from any file; a `SpeciesError` if it could name no file of a species."""
+    """An identifier of a species, which may have come from any file.
+
+    Raises
+    ------
+    SpeciesError
+        It could name no file of a species.
+    """
     if not is_identifier(text):
         raise SpeciesError(f"{quoted(text)} cannot name a species. Use only {IDENTIFIER_RULE}")
     return text
@@ -271,9 +308,19 @@ def _listed(folder: Path, _entries: tuple[tuple[str, int, int, int], ...], remed
 
 
 def load_species(identifier: str, folders: Sequence[Path] = (), known: Mapping[str, FileInfo] | None = None) -> Species:
-    """Read a species; unchanged files are read once. Folders, and what is known of their files, are as of
-    `list_species`. It is a `SpeciesError` if the identifier is not known (the message lists those that are), or the
-    file is broken.
+    """Read a species; unchanged files are read once.
+
+    Parameters
+    ----------
+    folders : sequence of Path
+        As of `list_species`.
+    known : mapping, optional
+        What `list_species` returned a moment ago.
+
+    Raises
+    ------
+    SpeciesError
+        Unknown identifier (the message lists the known ones), or a broken file.
     """
     known = list_species(folders) if known is None else known
     if identifier not in known:

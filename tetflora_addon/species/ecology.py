@@ -20,8 +20,14 @@ _FULL = 0.75
 
 
 def crown_leaves(leaves: Floats | float, height: Floats, base: Floats, radius: Floats) -> Floats:
-    """One-sided leaf area (n,) of crowns, m², by `Ecology.leaves` of their species, and heights, bases and radii (n,)
-    of plants and their crowns, meters.
+    """One-sided leaf area (n,) of crowns, m².
+
+    Parameters
+    ----------
+    leaves : (n,) float64 or float
+        `Ecology.leaves` of their species.
+    height, base, radius : (n,) float64
+        Of plants and their crowns, meters.
     """
     return np.pi * radius**2 * np.minimum((height - base) / (_FULL * height), 1.0) * leaves
 

@@ -133,6 +133,8 @@ def _fold(cuts: list[float], fold: np.ndarray, start: Range) -> float:
 def expected_polygons(species: Species) -> float:
     """Mean number of polygons of one plant, leaves and branches.
 
+    Notes
+    -----
     The rings of a flared base are left out; a leaf that is still the name of a Blender object counts as one polygon.
     """
     members = expected_members(species)

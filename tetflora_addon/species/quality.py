@@ -39,21 +39,32 @@ _STEPS = 36  # of bisection: to a hundred millionth of a unit
 
 @lru_cache(maxsize=256)
 def with_quality(species: Species, quality: float) -> Species:
-    """The same species with ``quality`` times the polygons, within `species.QUALITY_LIMITS`; 1 returns the species
-    itself.
+    """The same species with ``quality`` times the polygons.
 
-    Sides, segments, bends, thicknesses, and numbers and sizes of branches and leaves differ, within the limits of the
-    schema. Leaf area is kept, and the surface of wood as far as twigs stay thinner than what bears them, and with both
-    the mean colors. Where the limits do not let it reach the number, it comes as near as they do: below, some 12
-    branches of each order with 12 leaves in all; above, 10,000 leaves or branches on a branch.
+    Parameters
+    ----------
+    species : Species
+        As described.
+    quality : float
+        Within `species.QUALITY_LIMITS`; 1 returns the species itself.
 
-    A pure function of its arguments without random numbers; the last few results are kept. A species whose leaf is the
-    name of a Blender object is first to be given its mesh, because a leaf counts by its polygons.
+    Returns
+    -------
+    Species
+        Sides, segments, bends, thicknesses, and numbers and sizes of branches and leaves differ, within the limits of
+        the schema. Leaf area is kept, and the surface of wood as far as twigs stay thinner than what bears them, and
+        with both the mean colors. Where the limits do not let it reach the number, it comes as near as they do:
+        below, some 12 branches of each order with 12 leaves in all; above, 10,000 leaves or branches on a branch.
 
     Raises
     ------
     SpeciesError
         The quality is out of range or not finite, or a plant would have more than `catalog.MAX_POLYGONS` polygons.
+
+    Notes
+    -----
+    A pure function of its arguments without random numbers; the last few results are kept. A species whose leaf is the
+    name of a Blender object is first to be given its mesh, because a leaf counts by its polygons.
     """
     low, high = QUALITY_LIMITS
     if not low <= quality <= high:  # false for NaN as well

@@ -58,8 +58,16 @@ class Chains:
 
 
 def bezier_chains(control: Chains, left: Floats, right: Floats, steps: Integers) -> Chains:
-    """Cubic Bezier splines of control points with handles (p, 3) before and after each, in so many pieces (s,) between
-    two of them; 1 gives straight lines. Radii run evenly from one control point to the next.
+    """Cubic Bezier splines; radii run evenly from one control point to the next.
+
+    Parameters
+    ----------
+    control : Chains
+        Control points.
+    left, right : (p, 3) float64
+        Handles before and after each control point.
+    steps : (s,) int
+        Pieces between two control points of each spline, 1 or more; 1 gives straight lines.
     """
     counts = np.diff(control.first)
     owner = np.repeat(np.arange(len(counts)), counts)
@@ -160,11 +168,17 @@ def nurbs_chain(
 
 
 def joined_edges(chains: Chains) -> tuple[Floats, Integers, Integers]:
-    """Points (p, 4), edges (e, 2) and the chain (e,) of each, of one graph of chains: those that begin on another are
-    moved onto its line and joined to it there.
+    """One graph of chains; those that begin on another are moved onto its line and joined to it there.
 
     A chain begins on another where its first point, or else its last, is nearer to the other's line than its radius
     there, or than 1 % of the size of all.
+
+    Returns
+    -------
+    points : (p, 4) float64
+    edges : (e, 2) int64
+    line : (e,) int64
+        Chain of each edge.
     """
     points, edges = chains.points.copy(), chains.edges()
     owner = np.repeat(np.arange(len(chains.cyclic)), np.diff(chains.first))
@@ -287,7 +301,13 @@ _SAME = 1e-6  # of the largest; radii and lengths that differ by less are equal
 
 @dataclass(frozen=True, eq=False)
 class Skeleton:
-    """Points of a plant's drawn branches, equal where the numbers are."""
+    """Points of a plant's drawn branches; equal where the numbers are.
+
+    Raises
+    ------
+    ValueError
+        Arrays that do not fit each other, or a parent that does not stand before its child.
+    """
 
     points: Floats  # (p, 3): meters in the plant's space: z up, the origin at its foot
     radius: Floats  # (p,): meters

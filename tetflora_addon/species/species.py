@@ -538,9 +538,17 @@ def whole_cuts(order: Order) -> list[float]:
 
 
 def crown_ratio(shape: Integers, r: Floats) -> Floats:
-    """Length ratio (...) of children, 0 to 1, by indices (...) into `CROWN_PROFILES` and their places (...): 1 at the
-    lowest child, 0 at the parent's tip.
+    """Length ratio of a child, 0 to 1.
 
+    Parameters
+    ----------
+    shape : (...) int
+        Index into `CROWN_PROFILES`.
+    r : (...) float64
+        1 at the lowest child, 0 at the parent's tip.
+
+    Notes
+    -----
     Weber and Penn 1995, table of ShapeRatio. "Receding" is their rule for the branches of branches (section 4.3):
     parent's length less 0.6 of the way to the child. Their number of leaves and of further branches, less by half
     toward the tip, is what ``count_by_length`` 5/6 makes of it. The lower end of the two flames is raised from 0 to

@@ -348,8 +348,14 @@ _OUTSIDE = 0.1
 
 
 def planted(site: StandSite, traits: StandTraits, suitability: Floats, density: float, seed: int) -> Plants:
-    """Plants evenly spread, so many on a hectare, each somewhere in a square of its own; suitability (g, cells) is how
-    well each species grows.
+    """Plants evenly spread, each somewhere in a square of its own.
+
+    Parameters
+    ----------
+    suitability : (g, cells) float64
+        How well each species grows.
+    density : float
+        Plants on a hectare.
     """
     if density <= 0.0 or traits.planted.sum() <= 0.0:
         return Plants.empty()
@@ -516,11 +522,15 @@ class StandSettings:
 
 
 def grow(site: StandSite, species: Sequence[StandSpecies], settings: StandSettings) -> Job[Records]:
-    """Grow a stand; a job, which yields after each year and returns its records, or a `TetFloraError` that names a
-    setting that cannot be, or ground that is too large.
+    """Grow a stand; a job, which yields after each year and returns its records.
 
-    Records are of plants at year 0, each ``interval`` years, at the end, and whenever one appears, dies, falls or is
+    These are of plants at year 0, each ``interval`` years, at the end, and whenever one appears, dies, falls or is
     gone; with an interval of 0 those of the end alone.
+
+    Raises
+    ------
+    TetFloraError
+        A setting cannot be, or the ground is too large; names it.
     """
     stand = begun(site, species, settings)
     for year in range(settings.years):

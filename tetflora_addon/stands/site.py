@@ -50,7 +50,13 @@ class StandSite:
     coldest_month: float = -1.0  # mean temperature of the coldest month there, °C
 
     def __post_init__(self) -> None:
-        """Refuse what is no site by a `TetFloraError` that names what is wrong."""
+        """Refuse what is no site.
+
+        Raises
+        ------
+        TetFloraError
+            Names what is wrong.
+        """
         if not self.cell > 0.0:
             raise TetFloraError(f"The cells of a site must be larger than 0 m, not {self.cell:g} m")
         if np.ndim(self.height) != 2 or not np.size(self.height):

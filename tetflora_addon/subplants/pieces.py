@@ -93,8 +93,12 @@ def wood_areas(flora: Flora, pieces: Pieces) -> Floats:
 
 
 def open_subplants(flora: Flora, subplants: seeds.Branches) -> tuple[seeds.Branches, Integers, Pieces, Integers]:
-    """Open sub-plants into the sub-plants of the next order, with the one (m,) that each comes from, and the pieces of
-    their own branches, with theirs (k,).
+    """Open sub-plants into the sub-plants of the next order and the pieces of their own branch.
+
+    Returns
+    -------
+    Branches, (m,) int64, Pieces, (k,) int64
+        Children with the index of the sub-plant that each comes from, and pieces with theirs.
     """
     whole, body, grown, owner = growth.open_branches(flora.rows, subplants)
     pieces, piece_owner = whole_pieces(flora.rows, whole)
@@ -102,7 +106,12 @@ def open_subplants(flora: Flora, subplants: seeds.Branches) -> tuple[seeds.Branc
 
 
 def expand(flora: Flora, subplants: seeds.Branches) -> Iterator[growth.WholeBranches]:
-    """All branches of sub-plants, to the last twig, order by order; split with `chunks` what is too many for memory."""
+    """All branches of sub-plants, to the last twig, order by order.
+
+    Notes
+    -----
+    Memory grows with the number of branches; split the sub-plants with `chunks` where there are many.
+    """
     while len(subplants):
         whole, _, subplants, _ = growth.open_branches(flora.rows, subplants)
         yield whole

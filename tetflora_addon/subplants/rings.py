@@ -142,8 +142,15 @@ class Curve:
 
 
 def curve(lines: Axes, radius: Floats, weight: Floats) -> Curve:
-    """The curves of branches (n,) with radii (n, S + 1) at joints, within a part of which they stay; of weights (n,), 0
-    is for straight segments and 1 for the whole curve.
+    """The curves of branches.
+
+    Parameters
+    ----------
+    lines : Axes of n
+    radius : (n, S + 1) float64
+        At joints; curves stay within a part of it.
+    weight : (n,) float64
+        0 for straight segments, 1 for the whole curve.
     """
     n, most = len(lines.segments), lines.frames.shape[1]
     there = np.arange(most) < lines.segments[:, None]
@@ -536,8 +543,15 @@ def swelling(
 
 
 def roots(rows: Table, trunks: Branches, weight: Floats) -> tuple[Floats, Floats, Integers]:
-    """Surface roots of trunks (n,), which leave the buttresses, wind along the ground and lead into it: paths
-    (m, PLACES, 3) in the frames of the trunks' bases, and radii (m, PLACES), meters; and their trunks (m,).
+    """Surface roots of trunks (n,): they leave the buttresses, wind along the ground and lead into it.
+
+    Returns
+    -------
+    path : (m, PLACES, 3) float64
+        In the frames of the trunks' bases, meters.
+    width : (m, PLACES) float64
+        Radii, meters.
+    trunk : (m,) int64
     """
     angle, size = buttresses(trunks.key)
     trunk, which = spread(root_number(trunks.key))

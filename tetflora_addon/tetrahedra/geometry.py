@@ -18,7 +18,18 @@ FACES = np.array([(1, 2, 3), (0, 3, 2), (0, 1, 3), (0, 2, 1)])
 
 
 def signed_volume(vertices: Floats) -> Floats:
-    """Volume ``(...)``, m³, of tetrahedra ``(..., 4, 3)``, positive as they are: det(v1 − v0, v2 − v0, v3 − v0) / 6."""
+    """Volume, positive where the tetrahedron is positively oriented.
+
+    Parameters
+    ----------
+    vertices : (..., 4, 3) float64
+        Tetrahedra, meters.
+
+    Returns
+    -------
+    (...) float64
+        det(v1 − v0, v2 − v0, v3 − v0) / 6, cubic meters.
+    """
     a, b, c = (vertices[..., i, :] - vertices[..., 0, :] for i in (1, 2, 3))
     return np.sum(np.cross(a, b) * c, axis=-1) / 6.0
 
@@ -38,18 +49,39 @@ def squared_edges(vertices: Floats) -> Floats:
 
 
 def quality(vertices: Floats) -> Floats:
-    """Mean-ratio quality ``(...)`` of tetrahedra ``(..., 4, 3)``: 1 for the regular one, 0 for a flat one or a point.
+    """Mean-ratio quality η = 12 (3V)^(2/3) / Σ l², 1 for the regular tetrahedron and 0 for a flat one.
 
-    η = 12 (3V)^(2/3) / Σ l² (Liu and Joe, "Relationship between tetrahedron shape measures", BIT 34, 1994).
+    Parameters
+    ----------
+    vertices : (..., 4, 3) float64
+        Tetrahedra, meters.
+
+    Returns
+    -------
+    (...) float64
+        Quality, without unit. A tetrahedron that is a single point has quality 0.
+
+    Notes
+    -----
+    Liu and Joe, "Relationship between tetrahedron shape measures", BIT 34 (1994).
     """
     total = np.sum(squared_edges(vertices), axis=-1)
     return 12.0 * np.cbrt(3.0 * volume(vertices)) ** 2 / np.where(total > 0.0, total, 1.0)
 
 
 def face_area_vectors(vertices: Floats) -> Floats:
-    """Outward normals times area ``(..., 4, 3)``, m², of the faces opposite each vertex of tetrahedra ``(..., 4, 3)``.
+    """Outward normals times area of the four faces of positive tetrahedra.
 
-    The four add up to zero. They point inwards where the orientation is negative.
+    Parameters
+    ----------
+    vertices : (..., 4, 3) float64
+        Tetrahedra, meters.
+
+    Returns
+    -------
+    (..., 4, 3) float64
+        Vector ``i`` belongs to the face opposite vertex ``i``; square meters. The four add up to zero. They point
+        inwards where the orientation is negative.
     """
     a, b, c, d = (vertices[..., i, :] for i in range(4))
     ab, ac, ad = b - a, c - a, d - a
@@ -59,15 +91,36 @@ def face_area_vectors(vertices: Floats) -> Floats:
 
 
 def projected_area(vertices: Floats, direction: Floats) -> Floats:
-    """Area ``(...)``, m², of tetrahedra ``(..., 4, 3)`` across unit directions ``(..., 3)``: half of Σ |A_i · ω|."""
+    """Area of the silhouette in parallel projection: half of Σ |A_i · ω|.
+
+    Parameters
+    ----------
+    vertices : (..., 4, 3) float64
+        Tetrahedra of either orientation, meters.
+    direction : (3,) or (..., 3) float64
+        Unit viewing directions.
+
+    Returns
+    -------
+    (...) float64
+        Square meters, measured across the direction.
+    """
     areas = face_area_vectors(vertices)
     return np.sum(np.abs(np.sum(areas * np.asarray(direction)[..., None, :], axis=-1)), axis=-1) / 2.0
 
 
 def barycentric_gradients(vertices: Floats) -> Floats:
-    """Gradients ``(..., 4, 3)`` of barycentric coordinates in tetrahedra ``(..., 4, 3)``: ∇λ_i = −A_i / (3V), 1/m.
+    """Gradients of the four barycentric coordinates.
 
-    They are zero for tetrahedra without volume.
+    Parameters
+    ----------
+    vertices : (..., 4, 3) float64
+        Tetrahedra of either orientation, meters.
+
+    Returns
+    -------
+    (..., 4, 3) float64
+        ∇λ_i = −A_i / (3V), 1/m; zero for tetrahedra without volume.
     """
     triple = 3.0 * signed_volume(vertices)[..., None, None]
     flat = triple == 0.0
@@ -75,16 +128,39 @@ def barycentric_gradients(vertices: Floats) -> Floats:
 
 
 def barycentric(vertices: Floats, points: Floats) -> Floats:
-    """Coordinates λ ``(..., 4)`` of points ``(..., 3)`` in tetrahedra ``(..., 4, 3)``: Σ λ = 1, Σ λ_i v_i = point."""
+    """Barycentric coordinates of points, one tetrahedron each (leading axes broadcast).
+
+    Parameters
+    ----------
+    vertices : (..., 4, 3) float64
+        Tetrahedra, meters.
+    points : (..., 3) float64
+        Points, meters.
+
+    Returns
+    -------
+    (..., 4) float64
+        λ with Σ λ = 1 and Σ λ_i v_i = point.
+    """
     gradients = barycentric_gradients(vertices)[..., 1:, :]
     rest = np.sum(gradients * (points - vertices[..., 0, :])[..., None, :], axis=-1)
     return np.concatenate([1.0 - np.sum(rest, axis=-1, keepdims=True), rest], axis=-1)
 
 
 def plane_through(points: Floats, negative: Floats) -> Floats:
-    """Planes ``(..., 4)``, unit normal and offset, each through three points ``(..., 3, 3)`` that are not on one line.
+    """Planes through three points each, turned so that a fourth one is on the negative side.
 
-    Points ``negative`` ``(..., 3)`` are on side 0 of them.
+    Parameters
+    ----------
+    points : (..., 3, 3) float64
+        Three points of each plane, meters; not on one line.
+    negative : (..., 3) float64
+        A point on side 0 of each plane.
+
+    Returns
+    -------
+    (..., 4) float64
+        ``(nx, ny, nz, d)`` with unit normal.
     """
     a, b, c = (points[..., i, :] for i in range(3))
     normal = np.cross(b - a, c - a)

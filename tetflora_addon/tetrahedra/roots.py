@@ -63,7 +63,7 @@ _Piece = Floats | _Cut | _View
 
 
 def view_root(camera: ViewingCamera, bounds: ArrayLike) -> TetrahedralTree:
-    """Tree whose terminals are the view and the space around it; a ValueError if bounds or camera are not finite.
+    """Tree whose terminals are the view and the space around it.
 
     Parameters
     ----------
@@ -78,6 +78,11 @@ def view_root(camera: ViewingCamera, bounds: ArrayLike) -> TetrahedralTree:
     TetrahedralTree
         The pyramid of a perspective view is two terminals, the box of an orthographic one six. They are marked
         `inside`, all others are not; children inherit it.
+
+    Raises
+    ------
+    ValueError
+        If bounds or camera are not finite.
     """
     bounds = np.asarray(bounds, np.float64)
     if not (np.isfinite(bounds).all() and np.isfinite(camera.position).all() and np.isfinite(camera.window).all()):
@@ -241,8 +246,26 @@ SMALLEST = 1.0
 
 
 def world_cubes(bounds: ArrayLike) -> tuple[float, Integers, Integers]:
-    """Cubes around what is in a box (2, 3), meters: their side, a power of two, the lowest corner (3,) in sides, and
-    how many there are along each axis (3,), 1 or 2. A ValueError if the box is not finite.
+    """Cubes around a scene, at most two along each axis.
+
+    Parameters
+    ----------
+    bounds : (2, 3) float64
+        Lowest and highest corner of what is in the scene, meters.
+
+    Returns
+    -------
+    side : float
+        Meters, a power of two.
+    low : (3,) int64
+        Lowest corner, in sides.
+    number : (3,) int64
+        Cubes along each axis, 1 or 2.
+
+    Raises
+    ------
+    ValueError
+        If the bounds are not finite.
     """
     bounds = np.asarray(bounds, np.float64)
     if not np.isfinite(bounds).all():
@@ -255,8 +278,7 @@ def world_cubes(bounds: ArrayLike) -> tuple[float, Integers, Integers]:
 
 
 def world_root(bounds: ArrayLike, origin: ArrayLike = (0.0, 0.0, 0.0)) -> TetrahedralTree:
-    """Tree whose terminals are Kuhn's tetrahedra of the cubes around a scene, see `world_cubes`; none of them is
-    `inside`.
+    """Tree whose terminals are Kuhn's tetrahedra of the cubes around a scene.
 
     Parameters
     ----------
@@ -265,6 +287,16 @@ def world_root(bounds: ArrayLike, origin: ArrayLike = (0.0, 0.0, 0.0)) -> Tetrah
         has an order too.
     origin : (3,) float64
         Where in the world coordinates begin, whole meters: cubes are those of the world.
+
+    Returns
+    -------
+    TetrahedralTree
+        No terminal is marked `inside`, as nothing of it follows a camera.
+
+    Raises
+    ------
+    ValueError
+        If the bounds are not finite.
     """
     origin = np.asarray(origin, np.float64)
     side, low, number = world_cubes(np.asarray(bounds, np.float64) + origin)

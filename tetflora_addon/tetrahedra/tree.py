@@ -28,7 +28,17 @@ TIE = 1e-9
 
 
 def longest_edge(vertices: Floats) -> Integers:
-    """Index ``(n,)`` into `geometry.EDGES` of the longest edge of tetrahedra ``(n, 4, 3)``; of several the first."""
+    """Index into `geometry.EDGES` of the longest edge; the first of those that are equally long.
+
+    Parameters
+    ----------
+    vertices : (n, 4, 3) float64
+        Tetrahedra, meters.
+
+    Returns
+    -------
+    (n,) intp
+    """
     squared = squared_edges(vertices)
     return np.argmax(squared >= np.max(squared, axis=1, keepdims=True) * (1.0 - TIE), axis=1)
 
@@ -99,11 +109,21 @@ _CHILDREN, _PLANES = _tables()
 
 
 def best_diagonal(vertices: Floats) -> Integers:
-    """Diagonal ``(n,)`` of tetrahedra ``(n, 4, 3)`` along which the worst of the inner ones has the best quality.
+    """Diagonal along which the worst of the inner tetrahedra has the best quality.
 
-    Diagonal ``k`` joins the middles of edges ``k`` and ``5 - k`` of `geometry.EDGES`; of equally good ones it is the
-    first.
+    Parameters
+    ----------
+    vertices : (n, 4, 3) float64
+        Tetrahedra, meters.
 
+    Returns
+    -------
+    (n,) intp
+        Diagonal ``k`` joins the middles of edges ``k`` and ``5 - k`` of `geometry.EDGES`; the first of those that are
+        equally good.
+
+    Notes
+    -----
     All children have the same volume. Let S be the sum of the squared edges, D² the squared diagonal, and p and q the
     squares of the edges whose middles it joins. Two of the inner tetrahedra have edges of (S − p + 4 D²) / 4, two of
     (S − q + 4 D²) / 4, where 4 D² = S − 2 (p + q). The three 4 D² add up to S, so that of the shortest diagonal is
@@ -181,6 +201,12 @@ class TetrahedralTree:
     Node 0 is the root. Inner nodes near it may be convex regions without a tetrahedron; terminal nodes are tetrahedra
     once `split` is used (`tetflora_addon.tetrahedra.roots` sees to that). Between a tetrahedron and those that
     `split_by_shape` makes of it there may be such regions too.
+
+    Parameters
+    ----------
+    vertices : (4, 3) float64, optional
+        Tetrahedron of the root, positively oriented, meters. Without it the root is a region to be divided by
+        `divide`.
     """
 
     def __init__(self) -> None:
@@ -248,8 +274,22 @@ class TetrahedralTree:
         return np.flatnonzero(self.children[:, 0] < 0)
 
     def split(self, nodes: ArrayLike) -> Integers32:
-        """Divide terminal nodes (n,), each once, with a tetrahedron by longest-edge bisection; children are as of
-        `divide`.
+        """Divide terminal tetrahedra by longest-edge bisection.
+
+        Parameters
+        ----------
+        nodes : (n,) int
+            Terminal nodes with a tetrahedron, each once.
+
+        Returns
+        -------
+        (n, 2) int32
+            The children on sides 0 and 1 of the planes; they inherit `inside`.
+
+        Raises
+        ------
+        ValueError
+            If a node is not terminal, has no tetrahedron, or occurs twice.
         """
         nodes = np.asarray(nodes, np.intp)
         planes, halves = bisect(self.vertices(nodes))
@@ -258,10 +298,22 @@ class TetrahedralTree:
         return children
 
     def split_by_shape(self, nodes: ArrayLike) -> Integers32:
-        """Divide terminal nodes (n,), each once, with a tetrahedron into eight as suits their shape: the canonical
-        eight, or three bisections.
+        """Divide terminal tetrahedra into eight as suits their shape: the canonical eight, or three bisections.
 
-        Returned are terminals three levels further down, (n, 8) int32, see `tree.divide_by_shape`.
+        Parameters
+        ----------
+        nodes : (n,) int
+            Terminal nodes with a tetrahedron, each once.
+
+        Returns
+        -------
+        (n, 8) int32
+            Terminals three levels further down, see `tree.divide_by_shape`; they inherit `inside`.
+
+        Raises
+        ------
+        ValueError
+            If a node is not terminal, has no tetrahedron, or occurs twice.
         """
         nodes = np.asarray(nodes, np.intp)
         planes, pieces = divide_by_shape(self.vertices(nodes))
@@ -284,6 +336,11 @@ class TetrahedralTree:
         -------
         (n, 2) int32
             The children on sides 0 and 1; they inherit `inside`.
+
+        Raises
+        ------
+        ValueError
+            If a node is not terminal or occurs twice.
         """
         nodes = np.asarray(nodes, np.intp)
         first = self._size
@@ -315,7 +372,7 @@ class TetrahedralTree:
         eye : (3,) float64, optional
             Where rays start, meters, world space.
         direction : (3,) float64, optional
-            Common direction of parallel rays; needed if ``eye`` is None.
+            Common direction of parallel rays; used if ``eye`` is None.
         back_to_front : bool
             Rank from the farthest terminal instead, as the paper draws its final image.
 
@@ -324,6 +381,10 @@ class TetrahedralTree:
         (len,) int32
             0 for the nearest terminal (the farthest if ``back_to_front``) and so on; −1 for inner nodes.
 
+        Raises
+        ------
+        ValueError
+            If neither an eye nor a direction is given.
         """
         children, inner = self.children, self._levels_of_inner()
         count = np.ones(self._size, np.int32)
@@ -345,9 +406,17 @@ class TetrahedralTree:
         return place
 
     def locate(self, points: ArrayLike) -> Integers32:
-        """Terminal ``(n,)`` int32 that holds each point ``(n, 3)``, meters, world space; one on a plane is on side 1.
+        """Terminal that holds each point; points outside the root go to the one on their side of all planes.
 
-        Points outside the root go to the terminal on their side of all planes.
+        Parameters
+        ----------
+        points : (n, 3) float64
+            Meters, world space.
+
+        Returns
+        -------
+        (n,) int32
+            Node numbers. A point on a plane belongs to side 1.
         """
         points = np.asarray(points, np.float64).reshape(-1, 3)
         found = np.zeros(len(points), np.int32)
