@@ -349,6 +349,12 @@ class Terrain:
                 f"{broken:,} of {count:,} triangles of the ground have corners that are not finite numbers; "
                 "check its transform, modifiers and drivers, or run Mesh > Clean Up > Degenerate Dissolve"
             )
+        if self.weight is not None and np.shape(self.weight) != (count, 3):
+            raise ValueError(f"weight has shape {np.shape(self.weight)}, expected ({count}, 3)")
+        if (self.uv is None) != (self.image is None):
+            raise ValueError("image and uv must be given together")
+        if self.uv is not None and np.shape(self.uv) != (count, 3, 2):
+            raise ValueError(f"uv has shape {np.shape(self.uv)}, expected ({count}, 3, 2)")
 
     @property
     def map_area(self) -> float:

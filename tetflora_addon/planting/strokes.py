@@ -22,7 +22,7 @@ from ..parameters import meters, setting
 from .plane import NO_DISTANCE, Spacing, cells_of, packed
 from .rules import species_by_weight
 
-#: Cells that one dab looks at; a wider circle, or a higher density, is `too_many`.
+#: Cells that one dab looks at; a wider circle, or a higher density, is refused by `paint`.
 MOST_CELLS = 200_000
 _TRIES = 6  # places in a cell that are tried before it stays empty
 _TINY, _MOST_DABS = 1e-9, 64
@@ -122,6 +122,8 @@ def paint(brush: Brush, center: Sequence[float], standing: Floats, key: Keys, da
     ValueError
         `too_many` cells.
     """
+    if too_many(brush):
+        raise ValueError(f"the brush covers more than {MOST_CELLS:,} cells; lower its radius")
     side = cell_size(brush.density)
     middle = np.asarray(center, float)[:2]
     first, last = (np.floor((middle + sign * brush.radius) / side).astype(np.int64) for sign in (-1.0, 1.0))

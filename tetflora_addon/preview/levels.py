@@ -201,10 +201,12 @@ def colors_of(level: Level, mode: str, deepest: int) -> Floats32:
     if mode == "CONTRIBUTION":
         pixels = np.maximum(level.contribution, _LEAST)
         return ramp(np.log(pixels / _LEAST) / np.log(_MOST / _LEAST))
-    table = np.zeros((len(Decision), 3), np.float32)
-    for decision, color in FORMS.items():
-        table[decision] = color
-    return table[level.decision]
+    if mode == "FORM":
+        table = np.zeros((len(Decision), 3), np.float32)
+        for decision, color in FORMS.items():
+            table[decision] = color
+        return table[level.decision]
+    raise ValueError(f'unknown color mode "{mode}"; use LEVEL, VISIBILITY, FORM or CONTRIBUTION')
 
 
 def as_shown(linear: NDArray[np.floating]) -> Floats32:
@@ -275,6 +277,8 @@ def project(vertices: Floats, extinction: Floats, camera: Camera) -> Projected:
     ValueError
         If the camera is a panorama.
     """
+    if camera.kind == "PANO":
+        raise ValueError("a panorama bends the edges of tetrahedra; use a perspective or orthographic camera")
     vertices = np.asarray(vertices, np.float64)
     gradients = barycentric_gradients(vertices)
     if camera.kind == "ORTHO":

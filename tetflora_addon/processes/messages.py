@@ -56,7 +56,13 @@ def send(stream: BinaryIO, *things: object) -> None:
 
 
 def receive(stream: BinaryIO) -> list[object]:
-    """Objects of the next message, whose arrays can be written to; `Closed` if the sender has ended."""
+    """Objects of the next message; their arrays can be written to.
+
+    Raises
+    ------
+    Closed
+        The sender has ended.
+    """
     if stream.closed:
         raise Closed
     (number,) = _numbers(stream, 1)

@@ -322,6 +322,11 @@ class Skeleton:
             array = np.array(getattr(self, name), dtype=dtype, order="C")
             array.flags.writeable = False
             object.__setattr__(self, name, array)
+        n = len(self.points)
+        if self.points.shape != (n, 3) or {self.radius.shape, self.parent.shape, self.line.shape} != {(n,)}:
+            raise ValueError("a skeleton must have (p, 3) points, (p,) radii, (p,) parents and (p,) lines")
+        if not ((self.parent >= -1) & (self.parent < np.arange(n))).all():
+            raise ValueError("the parents of a skeleton must precede their children; use -1 for no parent")
 
     @cached_property
     def content(self) -> bytes:

@@ -167,9 +167,23 @@ def divide_in_eight(vertices: Floats, diagonal: Integers | None = None) -> tuple
 def divide_by_shape(vertices: Floats) -> tuple[Floats, Floats]:
     """Divide tetrahedra ``(n, 4, 3)`` into eight in the way that keeps them in better shape, so that no slivers arise.
 
-    Planes and children are as of `divide_in_eight`: those of it, or of `bisect_thrice`. Worst qualities are compared,
-    with a `HANDICAP` on the bisection of compact tetrahedra.
+    Both ways give eight of equal volume, three planes deep. Worst qualities are compared, with a `HANDICAP` on the
+    bisection of compact tetrahedra.
 
+    Parameters
+    ----------
+    vertices : (n, 4, 3) float64
+        Positively oriented tetrahedra, meters.
+
+    Returns
+    -------
+    planes : (n, 7, 4) float64
+        In the order of a heap, see `divide_in_eight`.
+    children : (n, 8, 4, 3) float64
+        Positively oriented, of equal volume.
+
+    Notes
+    -----
     The paper "chooses a subdivision depending on the aspect ratio of the resulting tetrahedra in order to avoid sliver
     subvolumes" (section 4). The eight leave compact shapes at least three quarters of their quality, but cannot help
     with long ones: where opposite edges differ much, all three diagonals are equally bad. Those gain by bisection.
@@ -201,12 +215,6 @@ class TetrahedralTree:
     Node 0 is the root. Inner nodes near it may be convex regions without a tetrahedron; terminal nodes are tetrahedra
     once `split` is used (`tetflora_addon.tetrahedra.roots` sees to that). Between a tetrahedron and those that
     `split_by_shape` makes of it there may be such regions too.
-
-    Parameters
-    ----------
-    vertices : (4, 3) float64, optional
-        Tetrahedron of the root, positively oriented, meters. Without it the root is a region to be divided by
-        `divide`.
     """
 
     def __init__(self) -> None:
@@ -292,7 +300,7 @@ class TetrahedralTree:
             If a node is not terminal, has no tetrahedron, or occurs twice.
         """
         nodes = np.asarray(nodes, np.intp)
-        planes, halves = bisect(self.vertices(nodes))
+        planes, halves = bisect(self._tetrahedra(nodes))
         children = self.divide(nodes, planes)
         self.place(children.ravel(), halves.reshape(-1, 4, 3))
         return children
@@ -316,7 +324,7 @@ class TetrahedralTree:
             If a node is not terminal, has no tetrahedron, or occurs twice.
         """
         nodes = np.asarray(nodes, np.intp)
-        planes, pieces = divide_by_shape(self.vertices(nodes))
+        planes, pieces = divide_by_shape(self._tetrahedra(nodes))
         for first, end in ((0, 1), (1, 3), (3, 7)):  # planes are in the order of a heap
             nodes = self.divide(nodes, planes[:, first:end].reshape(-1, 4)).reshape(-1)
         self.place(nodes, pieces.reshape(-1, 4, 3))
@@ -343,6 +351,8 @@ class TetrahedralTree:
             If a node is not terminal or occurs twice.
         """
         nodes = np.asarray(nodes, np.intp)
+        if (self.children[nodes, 0] >= 0).any() or (len(nodes) and np.bincount(nodes).max() > 1):
+            raise ValueError("only terminal nodes can be split, and each only once")
         first = self._size
         self._append(
             np.repeat(nodes.astype(np.int32), 2),
@@ -386,6 +396,8 @@ class TetrahedralTree:
         ValueError
             If neither an eye nor a direction is given.
         """
+        if eye is None and direction is None:
+            raise ValueError("a visibility order requires an eye or a direction")
         children, inner = self.children, self._levels_of_inner()
         count = np.ones(self._size, np.int32)
         for nodes in reversed(inner):
@@ -424,6 +436,12 @@ class TetrahedralTree:
             part = slice(start, start + POINT_BATCH)
             found[part] = self._descend(points[part])
         return found
+
+    def _tetrahedra(self, nodes: Integers) -> Floats:
+        vertices = self.vertices(nodes)
+        if np.isnan(vertices[:, 0, 0]).any():
+            raise ValueError("only nodes with a tetrahedron can be bisected; split regions by a plane instead")
+        return vertices
 
     def _descend(self, points: Floats) -> Integers32:
         node = np.zeros(len(points), np.int32)

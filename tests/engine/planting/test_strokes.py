@@ -179,3 +179,8 @@ def test_dabs_follow_the_mouse():
     assert np.allclose(dabs[-1], (10.0, 0.0, 2.0))
     assert (np.linalg.norm(np.diff(dabs, axis=0), axis=1) <= 3.0 + 0.2).all()
     assert len(strokes.dabs_along((0, 0, 0), (1e6, 0, 0), 0.1)) == 64
+
+
+def test_a_brush_for_which_the_map_has_too_many_cells_is_refused():
+    with pytest.raises(ValueError, match="cells"):
+        strokes.paint(Brush(radius=500.0, density=10.0), (0, 0), NONE, strokes.stroke_key(0, 0), 0)

@@ -165,6 +165,11 @@ def test_what_is_around_the_eye_or_behind_is_not_drawable() -> None:
     assert drawable(moved.astype(np.float32), camera).tolist() == [False, True, False]
 
 
+def test_panoramas_are_refused() -> None:
+    with pytest.raises(ValueError, match="panorama"):
+        project(tetrahedra(0), np.ones(1), replace(PERSP, kind="PANO"))
+
+
 @pytest.fixture(scope="module")
 def gathered() -> levels.Levels:
     flora, camera = support.small_flora(), support.camera((0, -30, 4), (0, 0, 1.5), pixels=200)
@@ -250,6 +255,8 @@ def test_colors_tell_tetrahedra_apart(gathered: levels.Levels) -> None:
         assert np.allclose(forms[level.decision == decision], color)
     shades = levels.ramp(np.linspace(0, 1, 9)) @ [0.3, 0.6, 0.1]
     assert (np.diff(shades) > 0).all()
+    with pytest.raises(ValueError, match="FORM"):
+        levels.colors_of(level, "MOOD", 1)
     np.testing.assert_allclose(levels.as_shown(np.array([0.0, 0.21404, 1.0])), [0, 0.5, 1], atol=1e-4)
 
 

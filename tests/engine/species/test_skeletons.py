@@ -288,6 +288,12 @@ def test_skeletons_are_equal_by_content_and_cannot_be_changed() -> None:
         one.points[0] = 1.0
 
 
+@pytest.mark.parametrize("parent", [[0, -1], [-1, 1], [-2, 0], [-1]])
+def test_a_parent_stands_before_its_child(parent: list[int]) -> None:
+    with pytest.raises(ValueError, match="skeleton"):
+        Skeleton(np.zeros((2, 3)), np.zeros(2), np.array(parent))
+
+
 _TWO = [[0, 0, 0], [0, 0, 1]]
 
 

@@ -238,15 +238,30 @@ def test_split_keeps_numbers_parents_and_the_view():
     assert (side[:, 0] < 0).all() and (side[:, 1] > 0).all()
 
 
-def test_one_tetrahedron_and_nothing_are_split():
+def test_only_terminal_tetrahedra_are_split_and_only_once():
     tree = TetrahedralTree()
     tree.place([0], np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]]))
     assert len(tree) == tree.levels == 1
     assert tree.order([0, 0, 9]).tolist() == [0]
     assert tree.locate([[5, 5, 5]]).tolist() == [0]
+    with pytest.raises(ValueError, match="only once"):
+        tree.split([0, 0])
     assert tree.split(np.zeros(0, int)).shape == (0, 2)
     tree.split([0])
+    with pytest.raises(ValueError, match="terminal"):
+        tree.split([0])
+    below = tree.terminals()[:1]
+    with pytest.raises(ValueError, match="terminal"):
+        tree.split_by_shape([0])
+    with pytest.raises(ValueError, match="only once"):
+        tree.split_by_shape(np.repeat(below, 2))
+    with pytest.raises(ValueError, match="region"):
+        TetrahedralTree().split_by_shape([0])
     assert tree.split_by_shape(np.zeros(0, int)).shape == (0, 8)
+    with pytest.raises(ValueError, match="region"):
+        TetrahedralTree().split([0])
+    with pytest.raises(ValueError, match="eye or a direction"):
+        tree.order()
 
 
 def test_scene_behind_the_camera_and_points_without_extent():
