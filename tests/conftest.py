@@ -19,7 +19,7 @@ from tests.durations import Durations
 # Examples are drawn at random on a desk; what CI says follows from the commit alone.
 settings.register_profile(
     "untimed",
-    max_examples=50,
+    max_examples=30,
     deadline=None,
     suppress_health_check=[HealthCheck.too_slow],
     derandomize="CI" in os.environ,

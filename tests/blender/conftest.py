@@ -3,6 +3,7 @@
 """Blender and the extension are there before the tests are collected, so they import both at the top of the file."""
 
 from collections.abc import Callable, Iterator
+from typing import Any
 
 import pytest
 
@@ -11,11 +12,55 @@ from devtools import session
 session.start()
 
 
+@pytest.fixture(autouse=True)
+def quickly_refined(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Small images get facets no finer than asked for, and bark and leaves no pattern: both are most of a refinement.
+
+    Not where a test or its file is marked ``fine``: there results are what artists get.
+    """
+    if request.node.get_closest_marker("fine"):
+        return
+    from tetflora_addon.blender.materials import blade, materials
+    from tetflora_addon.emission import budget
+
+    monkeypatch.setattr(budget, "FINEST", 1.0)
+    monkeypatch.setattr(materials, "bark_group", _plain_bark)
+    monkeypatch.setattr(blade, "_built", _plain_blade)
+
+
+def _plain_bark(character: str) -> Any:
+    """The group of a bark, of its color all over."""
+    from tetflora_addon.blender.materials import bark, nodes
+
+    def build(graph: Any, given: dict[str, Any]) -> dict[str, Any]:
+        normal = graph.outputs("ShaderNodeNewGeometry")["Normal"]
+        return {"Color": given["Color"], "Normal": normal, "Gain": 1.0, "Shown": 0.0}
+
+    outputs = (("Color", 'Color'), ("Normal", 'Vector'), ("Gain", 'Float'), ("Shown", 'Float'))
+    name, color = f"TetFlora {character.capitalize()} Bark", (("Color", 'Color'),)
+    return nodes.node_group(name, bark._VERSION, color, outputs, build)
+
+
+def _plain_blade(graph: Any, given: dict[str, Any], _name: str, _blade: object) -> dict[str, Any]:
+    """What the outputs of a leaf blade's group are linked to, without veins."""
+    normal = graph.outputs("ShaderNodeNewGeometry")["Normal"]
+    return {"Reflected": given["Color"], "Through": given["Color"], "Normal": normal} | {
+        name: given[name] for name in ("Gloss", "Roughness")
+    }
+
+
 @pytest.fixture
 def coarsely_looked_at(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Levels of exported plants follow from views of few cells, for tests of files: their colors are none of it."""
-    from tetflora_addon.export import levels, opaque
+    """Levels of exported plants follow from views of few cells, for tests of files: their colors are none of it.
 
+    Textures are a quarter as wide.
+    """
+    from tetflora_addon.blender.export import surfaces
+    from tetflora_addon.export import images, levels, opaque
+
+    for module in (images, surfaces):
+        monkeypatch.setattr(module, "TEXELS", 64)
+    monkeypatch.setattr(images, "MARGIN", 2)
     monkeypatch.setattr(opaque, "_CELLS", 48)
     monkeypatch.setattr(levels, "_FEWEST_CELLS", 40)
     monkeypatch.setattr(levels, "_MOST_CELLS", 80)

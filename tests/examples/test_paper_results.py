@@ -21,6 +21,7 @@ from examples.paper import figure8, figure9, tables
 from examples.paper.__main__ import IMAGES, PAGE
 from tests.blender import renders
 from tetflora_addon.blender import compat
+from tetflora_addon.emission import budget
 
 
 @pytest.fixture
@@ -34,6 +35,7 @@ def make(clean_file, tmp_path, monkeypatch):
         renders.few_directions(scene.world)
 
     monkeypatch.setattr(stage, "daylight", daylight)
+    monkeypatch.setattr(budget, "FINEST", 1.0)  # small images have finer facets by themselves
 
     def make_figure(name: str) -> dict[str, float]:
         return importlib.import_module(f"examples.paper.{name}").make(tmp_path, tmp_path / "images", small=True)

@@ -226,6 +226,7 @@ def unevenly_rough(graph: Graph, _material: bpy.types.Material) -> None:
     graph.node("ShaderNodeOutputMaterial", {"Surface": shader})
 
 
+@pytest.mark.fine
 def test_blender_reads_the_plant_with_its_textures(blender, tmp_path, pxr):
     """Its own importer finds the same surface, and images whose mean is the color of the leaves."""
     add_plant("one", "bush", 3)

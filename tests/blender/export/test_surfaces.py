@@ -24,7 +24,7 @@ from tetflora_addon.export.forest import BakedSurface, Variant
 from tetflora_addon.export.images import MARGIN
 from tetflora_addon.export.levels import PlantLevel
 
-pytestmark = pytest.mark.usefixtures("clean_file")
+pytestmark = [pytest.mark.usefixtures("clean_file"), pytest.mark.fine]
 MIDDLE = slice(2 * MARGIN, -2 * MARGIN)
 SQUARE = (0, 0), (1, 0), (1, 1), (0, 1)
 

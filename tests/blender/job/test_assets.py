@@ -348,6 +348,7 @@ def test_what_a_layer_collection_says_of_a_scatterer_holds_for_its_instances_eac
         assert shown()
 
 
+@pytest.mark.fine
 def test_facets_of_scatterers_that_look_otherwise_are_apart():
     scene, ground, tree = forest(away=2500.0)
     other = scattered(tree, COUNT)

@@ -13,7 +13,7 @@ from devtools.build import ROOT
 from tests.blender.scenes import add_mesh, select, tiny_render
 from tetflora_addon.blender.compat import shader_tree
 
-pytestmark = pytest.mark.usefixtures("clean_file")
+pytestmark = [pytest.mark.usefixtures("clean_file"), pytest.mark.fine]
 
 
 @pytest.mark.parametrize("page", ["README.md", "docs/manual/tutorials.md"])

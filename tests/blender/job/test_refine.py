@@ -116,6 +116,7 @@ def test_shadows_of_what_is_behind_the_camera_are_refined_if_asked_for():
     assert _refine(scene, shadow_cutoff=0.0).polygons_proxy == coarse.polygons_proxy
 
 
+@pytest.mark.fine
 def test_results_carry_uvs_materials_and_smooth_tubes():
     scene = _forest()
     _refine(scene)

@@ -11,7 +11,7 @@ from tests.blender.scenes import add_camera, add_plant, datablocks
 from tetflora_addon.blender.job import refine
 from tetflora_addon.blender.results.collection import Results, result_collections
 
-pytestmark = pytest.mark.usefixtures("clean_file")
+pytestmark = [pytest.mark.usefixtures("clean_file"), pytest.mark.fine]
 
 
 @pytest.fixture

@@ -15,7 +15,7 @@ from tetflora_addon.blender.results import meshes
 from tetflora_addon.leaves.models import LEAF_MODELS
 from tetflora_addon.subplants.leaf_meshes import LeafCopies
 
-pytestmark = pytest.mark.usefixtures("clean_file")
+pytestmark = [pytest.mark.usefixtures("clean_file"), pytest.mark.fine]
 
 COLOR, TRANSMISSION = np.array([0.11, 0.2, 0.035]), 0.4
 MODELS = {"palmate": "maple", "lobed": "lobed", "narrow": "lanceolate", "petal": "round", "plain": "deltoid"}

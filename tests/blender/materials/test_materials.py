@@ -14,7 +14,7 @@ from tetflora_addon.blender.materials import bark, materials, microsphere, nodes
 from tetflora_addon.blender.results import meshes
 from tetflora_addon.species import species
 
-pytestmark = pytest.mark.usefixtures("clean_file")
+pytestmark = [pytest.mark.usefixtures("clean_file"), pytest.mark.fine]
 
 #: How light linear red, green and blue are.
 LIGHT = np.array([0.2126, 0.7152, 0.0722])

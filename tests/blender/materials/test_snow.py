@@ -14,7 +14,7 @@ from tetflora_addon.blender.job import frame_cache, refine
 from tetflora_addon.blender.materials import materials, microsphere, nodes, snow, soil
 from tetflora_addon.blender.results import meshes
 
-pytestmark = pytest.mark.usefixtures("clean_file")
+pytestmark = [pytest.mark.usefixtures("clean_file"), pytest.mark.fine]
 
 GREEN = (0.05, 0.2, 0.05)
 

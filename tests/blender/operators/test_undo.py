@@ -369,7 +369,7 @@ def test_a_population_on_a_collection_goes_on_after_undo(history):
     scene().tetflora.layers[0].grounds.clear()
     scene().tetflora.layers[0].ground_collection = grounds
     bpy.ops.ed.undo_push(message="On a collection")
-    for _ in range(3):
+    for _ in range(2):
         assert ops().update_layers('EXEC_DEFAULT', True, **REROLL) == {'FINISHED'}
         assert ops().refine('EXEC_DEFAULT', True) == {'FINISHED'}
         before = everything()

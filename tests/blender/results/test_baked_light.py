@@ -10,7 +10,7 @@ import bpy
 import numpy as np
 import pytest
 
-from tests.blender.renders import few_directions, picture, small_scene
+from tests.blender.renders import few_directions, picture, same_samples, small_scene
 from tests.blender.scenes import add_mesh, add_plant, datablocks, depsgraph
 from tetflora_addon.blender import compat
 from tetflora_addon.blender.job import refine
@@ -178,7 +178,7 @@ FORMS = ['MICROSURFACES', 'SHELLS', 'MICROSPHERES']
 
 def bush_before_the_sky(engine='CYCLES', samples=16):
     """A bush that is proxies for the most part, in sun and skylight, 48 pixels wide; gives the scene."""
-    samples = samples if engine == 'CYCLES' else 4  # of half a second each, without a GPU
+    samples = samples if engine == 'CYCLES' else same_samples(engine)  # of half a second each, without a GPU
     small_scene(sky=0.4, samples=samples, sun=40.0, size=48, width=3.6, shadows=True)
     scene = bpy.context.scene
     scene.render.engine = engine if engine == 'CYCLES' else compat.eevee_engine()

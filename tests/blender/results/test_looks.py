@@ -84,6 +84,7 @@ def alpha(scene, tmp_path):
     return pixels[:, :12].sum(), pixels[:, 12:].sum()
 
 
+@pytest.mark.fine
 @pytest.mark.parametrize("make", MADE)
 def test_holdout_and_indirect_only_of_a_layer_collection_are_what_the_renderer_sees(scene, tmp_path, make):
     layer = in_collection(scene, make(scene))
@@ -191,6 +192,7 @@ def test_eyes_of_view_layers_divide_no_render(scene):
     assert len(view_layer_groups(scene)) == 2
 
 
+@pytest.mark.fine
 def test_view_layers_with_other_holdouts_have_results_of_their_own(scene, tmp_path):
     special = as_plant(scene)
     in_collection(scene, special)

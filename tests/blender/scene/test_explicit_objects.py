@@ -82,6 +82,7 @@ def _read():
     return read_explicit(depsgraph())
 
 
+@pytest.mark.fine
 def test_near_meshes_come_out_as_they_are_without_any_plant():
     """Faces, material, texture coordinates; the original is hidden meanwhile."""
     scene = _scene()
@@ -311,6 +312,7 @@ def test_plants_meshes_and_occluders_together():
     assert both.polygons_full == free.polygons_full + 1
 
 
+@pytest.mark.fine
 def test_the_refined_picture_is_that_of_the_mesh():
     """Mean radiance over blocks of the picture; the leaf limit makes most of it proxies."""
 

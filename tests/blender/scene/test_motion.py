@@ -174,6 +174,7 @@ def test_plants_without_motion_have_none(scene, off, value):
     assert read_plants(scene, depsgraph())[0].motion is None
 
 
+@pytest.mark.fine
 def test_every_part_of_a_plant_that_turns_has_the_velocity_of_its_place(scene):
     directly(scene, path="rotation_euler", index=2, step=TURN)
     refine.refine(scene, depsgraph())

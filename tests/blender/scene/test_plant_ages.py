@@ -282,6 +282,7 @@ def test_the_panel_tells_the_stage(scene):
     assert "Dead" in told[9_000.0]
 
 
+@pytest.mark.fine
 def test_ages_of_a_species_share_meshes(scene):
     scene.render.resolution_x = scene.render.resolution_y = 120
     row_of_plants([0.0, 0.0])
