@@ -187,7 +187,7 @@ def mean_silhouette(model: LeafModel) -> float:
     for toward in spiral((number + 0.5) / _DIRECTIONS, number, GOLDEN_ANGLE):
         across = perpendicular(toward[None])[0]
         flat = corners @ np.stack([across, np.cross(toward, across)], axis=1)
-        low, high = np.array([(of.min(), of.max()) for of in flat.reshape(-1, 2).T]).T
+        low, high = flat.min(axis=(0, 1)), flat.max(axis=(0, 1))
         # In cells, the middles of which are whole numbers.
         flat = (flat - low) * (_CELLS / np.maximum(high - low, 1e-12)) - 0.5
         least = np.ceil(flat.min(axis=0)).astype(np.int64).clip(0, _CELLS)
