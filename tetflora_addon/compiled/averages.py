@@ -351,7 +351,16 @@ def _over(own: Floats, plain: Floats) -> Floats:
 
 
 def shaped_totals(rows: Table, totals: Averages, polygons: Floats) -> ShapedTotals:
-    """Totals of all rows (r,), from those of plants as described, and faces (r,) of a leaf of each row."""
+    """Totals of all rows.
+
+    Parameters
+    ----------
+    rows : (r,) parameter table
+    totals : Averages
+        Of plants as described.
+    polygons : (r,) float64
+        Faces of a leaf of each row.
+    """
     every = np.arange(len(rows))
     bearing = (rows["next"][:, (LATERAL, DEAD, FORK)] >= 0).any(axis=1)
     solid = rows["phantom"] | rows["drawn"] | (rows["envelope"] > 0)

@@ -233,7 +233,13 @@ class Quantity(NamedTuple):
 
 
 def cell_of(text: str, points: bool = False) -> Quantity:
-    """What a cell says; where other cells have decimal ``points``, a comma before three digits parts thousands."""
+    """What a cell says.
+
+    Parameters
+    ----------
+    points : bool
+        Other cells have decimal points, so that a comma before three digits parts thousands.
+    """
     text = text.strip().lower().strip("*").strip()
     if text in _MISSING:
         return Quantity(0.0, kind=NOTHING)

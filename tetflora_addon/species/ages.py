@@ -37,10 +37,20 @@ _MORE_DEAD = 4.0
 
 
 def with_habit(species: Species, habit: float) -> Species:
-    """A species, described as a plant that stands free, between that (0) and what becomes of it in a dense stand (1).
+    """A species between its description and what becomes of it in a dense stand.
 
-    Of the first orders, bare lengths, lengths, thicknesses and numbers differ, within the limits of the schema. A
-    species whose form is drawn by hand, and one of a single order, keep what they have.
+    Parameters
+    ----------
+    species : Species
+        As described: a plant that stands free.
+    habit : float
+        0 returns the species itself, 1 gives the trees of a dense stand.
+
+    Returns
+    -------
+    Species
+        Of the first orders, bare lengths, lengths, thicknesses and numbers differ, within the limits of the schema. A
+        species whose form is drawn by hand, and one of a single order, keep what they have.
     """
     if habit == 0 or species.skeleton is not None or len(species.orders) < 2:
         return species
@@ -146,10 +156,19 @@ def stage(species: Species, years: float) -> str:
 
 @lru_cache(maxsize=256)
 def with_age(species: Species, years: float) -> Species:
-    """A species as its plants are at an age in years; its habit is applied.
+    """A species as its plants are at an age.
 
-    Of orders, short shoots and dead branches, lengths, thicknesses and numbers differ, and where they are. At 0, and at
-    the age at which it is as described, it is the species itself.
+    Parameters
+    ----------
+    species : Species
+        As described; its habit is applied.
+    years : float
+        0, or the age at which it is as described, returns the species itself.
+
+    Returns
+    -------
+    Species
+        Of orders, short shoots and dead branches, lengths, thicknesses and numbers differ, and where they are.
     """
     ages = ages_of(species)
     if years <= 0 or years == ages.full or (ages.scaled and years >= ages.full):

@@ -231,7 +231,15 @@ _DEAD_DIAMETER = 0.4
 def grown(
     plants: Plants, crowns: Crowns, taken: NDArray, light: LightGrid, traits: StandTraits, block: slice
 ) -> Plants:
-    """Some plants, a block of all, a year later, by their crowns and the light that they take, m²."""
+    """Some plants a year later.
+
+    Parameters
+    ----------
+    crowns, taken
+        Of these plants: where they are, and the light that they take, m².
+    block : slice
+        Of all plants.
+    """
     one = plants.take(block)
     x, y, radius, base, height = (
         value[block] for value in (crowns.x, crowns.y, crowns.radius, crowns.base, crowns.height)
@@ -561,7 +569,14 @@ def _check(settings: StandSettings) -> None:
 
 
 class GrowingStand:
-    """A stand in a year: ``plants`` that live, and ``dead`` ones."""
+    """A stand in a year.
+
+    Attributes
+    ----------
+    plants : Plants
+        Those that live.
+    dead : DeadPlants
+    """
 
     def __init__(self, site: StandSite, traits: StandTraits, settings: StandSettings) -> None:
         self.site, self.traits, self.settings = site, traits, settings

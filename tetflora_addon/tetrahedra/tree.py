@@ -215,6 +215,12 @@ class TetrahedralTree:
     Node 0 is the root. Inner nodes near it may be convex regions without a tetrahedron; terminal nodes are tetrahedra
     once `split` is used (`tetflora_addon.tetrahedra.roots` sees to that). Between a tetrahedron and those that
     `split_by_shape` makes of it there may be such regions too.
+
+    Parameters
+    ----------
+    vertices : (4, 3) float64, optional
+        Tetrahedron of the root, positively oriented, meters. Without it the root is a region to be divided by
+        `divide`.
     """
 
     def __init__(self) -> None:
