@@ -145,10 +145,7 @@ def size_of(variants: Iterable[tuple[Target, Floats]], depsgraph: bpy.types.Deps
 def reach_of(target: Target, depsgraph: bpy.types.Depsgraph) -> float:
     """Distance from an asset's origin within which all of it lies, meters in its own space.
 
-    Raises
-    ------
-    SceneError
-        It instances itself.
+    Errors are those of `Target.parts`.
     """
     boxes = [np.linalg.norm(_corners(*box), axis=-1).max() for box in _boxes(target, depsgraph)]
     return float(max(boxes, default=0.0))
@@ -264,8 +261,6 @@ def use_as_species(
 
     Parameters
     ----------
-    scene : bpy.types.Scene
-        Receives the entry.
     datablock : bpy.types.Object or bpy.types.Collection
         Original; may be linked from a library.
     variants : bool

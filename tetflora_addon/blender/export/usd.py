@@ -45,13 +45,7 @@ _NAMES = {'FLOAT': "Float", 'INT': "Int", 'INT32_2D': "Int2", 'FLOAT_VECTOR': "F
 
 
 def library() -> SimpleNamespace:
-    """USD's modules.
-
-    Raises
-    ------
-    TetFloraError
-        This Blender has none.
-    """
+    """USD's modules; a `TetFloraError` where this Blender has none."""
     if (found := usd()) is None:
         raise TetFloraError("This Blender was built without USD; choose glTF or OBJ, or use another build")
     return found
@@ -328,7 +322,7 @@ _TRANSFORM = {"rotation_mode", "location", "rotation_euler", "rotation_quaternio
 
 @importing
 def forest_steps(order: Import, mix: Mapping[str, float]) -> Steps:
-    """Make a field for each object whose plants a file holds; yields progress. Closing the steps leaves all as it was.
+    """Make a field for each object whose plants a file holds; see `importing`.
 
     Parameters
     ----------

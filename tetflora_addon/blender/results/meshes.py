@@ -111,7 +111,7 @@ def _fill(mesh: bpy.types.Mesh, buffers: MeshBuffers) -> Iterator[None]:
 
 
 def check_buffers(buffers: MeshBuffers) -> None:
-    """Raise ValueError unless shapes, dtypes, indices, faces and attributes of buffers are valid in Blender."""
+    """Raise ValueError where shapes, dtypes, indices, faces or attributes are not valid; Blender would crash."""
     corners, faces, vertices = len(buffers.corner_verts), buffers.polygons, len(buffers.positions)
     for key, shape, dtype in (
         ("positions", (vertices, 3), np.float32),
