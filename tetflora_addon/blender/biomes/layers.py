@@ -13,7 +13,7 @@ import bpy
 from ..placing.plant_objects import PAINTED_MARK, note_field, plant_collection
 from ..placing.populations import add_population
 from ..placing.rules import BIOME_ONLY, awaits_update, copy_settings, free_seed, grounds_of, set_grounds
-from ..runtime import Handlers
+from ..runtime import handlers
 from ..scene.fields import has_history, stored_size
 from ..settings import BIOME, FIELD, SCATTER, active_in, rules_of
 from ..stands.growing import stand_settings_now
@@ -243,5 +243,4 @@ def _on_load(*_: object) -> None:
             bring_together(scene)
 
 
-_HANDLERS = Handlers(load_post=_on_load)
-register, unregister = _HANDLERS.register, _HANDLERS.unregister
+register, unregister = handlers(load_post=_on_load)

@@ -22,7 +22,7 @@ from ...growth.seasons import PRESENT, expected_of
 from ...processes import pool
 from ...species.kinds import Kind, species_of
 from ..attributes import read, values_of
-from ..runtime import Handlers, Outlook, in_order
+from ..runtime import Outlook, handlers, in_order
 from ..scene.ages import crown_kinds
 from ..scene.camera import read_camera
 from ..scene.crowns import crown_to_draw
@@ -267,7 +267,7 @@ def _on_load(*_: object) -> None:
     _counted.stand, _learned = None, 1.0
 
 
-_HANDLERS = Handlers(depsgraph_update_post=_on_change, undo_post=_on_change, redo_post=_on_change, load_post=_on_load)
+_HANDLERS = handlers(depsgraph_update_post=_on_change, undo_post=_on_change, redo_post=_on_change, load_post=_on_load)
 #: By now crowns may be known, or memory short.
 _outlook = Outlook(_text_for, old=2.0)
 

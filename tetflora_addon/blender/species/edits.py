@@ -39,7 +39,7 @@ from ...species.catalog import (
 from ...species.species import Species
 from ..declare import string
 from ..preferences import species_folders
-from ..runtime import Handlers, Listeners
+from ..runtime import Listeners, handlers
 from .asset_species import asset_infos, asset_species, copy_asset, find_asset, listed_in, name_of, refuse_asset
 
 #: Custom property of collections: JSON of species by their identifiers, see `pack`.
@@ -427,6 +427,4 @@ def _on_import(context: bpy.types.BlendImportContext, _other: object = None) -> 
                     entry.object.use_fake_user = True  # nothing else may hold it here
 
 
-_HANDLERS = Handlers(save_pre=pack, blend_import_post=_on_import)
-register: Callable[[], None] = _HANDLERS.register
-unregister: Callable[[], None] = _HANDLERS.unregister
+register, unregister = handlers(save_pre=pack, blend_import_post=_on_import)
