@@ -9,8 +9,6 @@ from types import SimpleNamespace
 import bpy
 import gpu
 
-#: For people to read: nothing depends on it.
-VERSION_TEXT = bpy.app.version_string
 EEVEE_ENGINES = ("BLENDER_EEVEE", "BLENDER_EEVEE_NEXT")
 
 

@@ -312,7 +312,7 @@ def is_plain(scene: bpy.types.Scene, places: Sequence[Places], depsgraph: bpy.ty
     if not places or scene.tetflora.asset_detail == 'REFINE':
         return not places
     targets, costs = _costs(places, depsgraph)
-    return not targets or costs.plain(_in_cycles(scene), left)
+    return not targets or costs.plain(scene.render.engine == 'CYCLES', left)
 
 
 def bind_steps(
@@ -334,7 +334,8 @@ def bind_steps(
         yield progress
         assets.append((yield from _compiled(scene, target, depsgraph, progress)))
     index = {target: i for i, target in enumerate(targets)}
-    owners = list(dict.fromkeys(_owner(one) for one in places))
+    shown = [one.owner if len(one.owners) == 1 else None for one in places]
+    owners = list(dict.fromkeys(shown))
     matrices = np.concatenate([one.matrices for one in places])
     number = [len(one) for one in places]
     instances = Instances(
@@ -344,18 +345,11 @@ def bind_steps(
         np.concatenate([one.keys for one in places]),
     )
     placed = PlacedAssets(AssetTable.of(assets), instances)
-    owner = np.repeat([owners.index(_owner(one)) for one in places], number).astype(np.int32)
+    owner = np.repeat([owners.index(one) for one in shown], number).astype(np.int32)
     _, costs = _costs(places, depsgraph, _covered(placed, camera))
-    originals = costs.originals(_in_cycles(scene), left, always=scene.tetflora.asset_detail == 'AUTO')
+    in_cycles, always = scene.render.engine == 'CYCLES', scene.tetflora.asset_detail == 'AUTO'
+    originals = costs.originals(in_cycles, left, always=always)
     return SceneAssets(tuple(targets), placed, matrices, tuple(owners), owner, originals)
-
-
-def _owner(places: Places) -> bpy.types.Object | None:
-    return places.owner if len(places.owners) == 1 else None
-
-
-def _in_cycles(scene: bpy.types.Scene) -> bool:
-    return scene.render.engine == 'CYCLES'
 
 
 def _costs(
