@@ -243,7 +243,7 @@ def set_quality(group: bpy.types.PropertyGroup, number: int) -> None:
 
 
 class RefinementProperties(settings_in(RefinementSettings)):
-    """Refinement settings of a scene: the engine's, quality, and the look of shells."""
+    """Refinement settings of a scene: the engine's, quality, the look of shells, and what frames share."""
 
     quality: choice(
         "Quality",
@@ -260,10 +260,6 @@ class RefinementProperties(settings_in(RefinementSettings)):
     shell_spear: real("Shell Spear", "", 7.5, **{**_SHELL, "max": 1000.0})
     shell_roundness: real("Shell Roundness", "", 1.0, **_SHELL)
     shell_variation: real("Shell Variation", "", 0.05, **_SHELL)
-
-
-class AnimationProperties:
-    """Animation settings of a scene: what frames share, and the size of the frame cache."""
 
     share_frames: boolean(
         "Share Between Frames",

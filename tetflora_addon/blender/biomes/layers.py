@@ -6,7 +6,6 @@ A biome is followed by the layers that it is made of, which know its identity. L
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import bpy
 
@@ -18,23 +17,14 @@ from ..scene.fields import has_history, stored_size
 from ..settings import BIOME, FIELD, SCATTER, active_in, rules_of
 from ..stands.growing import stand_settings_now
 
-
-@dataclass(frozen=True)
-class LayerKind:
-    """What a layer is, as artists see it."""
-
-    name: str
-    icon: str
-
-
-SCATTERED, COVERING = LayerKind("Scatter", 'OUTLINER_OB_POINTCLOUD'), LayerKind("Cover", 'OUTLINER_OB_CURVES')
-GROUP, STAND = LayerKind("Biome", 'WORLD'), LayerKind("Stand", 'TIME')
-PAINTED, IMPORTED = LayerKind("Painted", 'BRUSH_DATA'), LayerKind("Imported", 'IMPORT')
+#: What layers are, by their icons.
+SCATTERED, COVERING, GROUP = 'OUTLINER_OB_POINTCLOUD', 'OUTLINER_OB_CURVES', 'WORLD'
+STAND, PAINTED, IMPORTED = 'TIME', 'BRUSH_DATA', 'IMPORT'
 Layer = bpy.types.PropertyGroup
 
 
-def kind_of(layer: Layer) -> LayerKind:
-    """What a layer is."""
+def kind_of(layer: Layer) -> str:
+    """What a layer is, as artists see it: its icon."""
     if layer.kind == SCATTER:
         return COVERING if layer.covers else SCATTERED
     if layer.kind == BIOME:
