@@ -2,13 +2,17 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What objects are to TetFlora: marks, and species; convert fields; edit the lists of the panels."""
 
-from collections.abc import Callable
-from dataclasses import dataclass
-
 import bpy
 from bpy.types import Operator
 
-from ..tetflora_addon.blender.assets.marks import can_be_species, is_species, scattered, stop_using, use_as_species
+from ..tetflora_addon.blender.assets.marks import (
+    can_be_species,
+    is_species,
+    scattered,
+    species_shown,
+    stop_using,
+    use_as_species,
+)
 from ..tetflora_addon.blender.biomes.layers import forget_gone
 from ..tetflora_addon.blender.declare import boolean, choice, once, string
 from ..tetflora_addon.blender.placing import plant_objects
@@ -16,7 +20,7 @@ from ..tetflora_addon.blender.placing.populations import adopt, collection_of, o
 from ..tetflora_addon.blender.placing.properties import MOST_EMPTIES
 from ..tetflora_addon.blender.scene.fields import FIELD_TYPES, fields_of
 from ..tetflora_addon.blender.scene.objects import SURFACE_TYPES, is_scatter, mark_scatter, may_instance, may_scatter
-from ..tetflora_addon.blender.species.asset_species import Datablock, asset_of
+from ..tetflora_addon.blender.species.asset_species import Datablock
 from ..tetflora_addon.blender.species.catalog import default_species
 from ..tetflora_addon.blender.species.edits import catalog
 from ..tetflora_addon.errors import SceneError, listed
@@ -34,20 +38,14 @@ def can_be_field(obj: bpy.types.Object | None) -> bool:
     return obj is not None and (obj.type in FIELD_TYPES or obj.tetflora.is_field)
 
 
-@dataclass(frozen=True)
-class _Mark:
-    """A property of objects that is a mark, which objects may bear it, and what is said."""
-
-    name: str
-    fits: Callable[[bpy.types.Object], bool]
-    nothing: str
-    marked: str
-
-
+#: Properties of objects that are marks, which objects may bear them, and what is said where none may and of others.
 _MARKS = {
-    'OCCLUDER': _Mark("is_occluder", lambda obj: obj.type == 'MESH', "Select meshes first", "{} marked as occluder"),
-    'EXPLICIT': _Mark(
-        "is_explicit", can_be_explicit, "Select meshes, or objects that instance them, first", "{} will be refined"
+    'OCCLUDER': ("is_occluder", lambda obj: obj.type == 'MESH', "Select meshes first", "{} marked as occluder"),
+    'EXPLICIT': (
+        "is_explicit",
+        can_be_explicit,
+        "Select meshes, or objects that instance them, first",
+        "{} will be refined",
     ),
 }
 
@@ -100,16 +98,16 @@ class TETFLORA_OT_mark(Reporting, Operator, label="Use Selected Objects As", tol
             return self._mark_field(context)
         if self.what == 'SCATTER':
             return self._mark_scatters(context)
-        mark = _MARKS[self.what]
+        name, fits, nothing, marked = _MARKS[self.what]
         # Something marked that has since become something else can still be unmarked.
-        chosen = [o for o in context.selected_objects if mark.fits(o) or getattr(o.tetflora, mark.name)]
+        chosen = [o for o in context.selected_objects if fits(o) or getattr(o.tetflora, name)]
         if not chosen:
-            return self.failed(mark.nothing)
-        wanted = self._wanted(all(getattr(o.tetflora, mark.name) for o in chosen))
+            return self.failed(nothing)
+        wanted = self._wanted(all(getattr(o.tetflora, name) for o in chosen))
         for obj in chosen:
-            setattr(obj.tetflora, mark.name, wanted and mark.fits(obj))
+            setattr(obj.tetflora, name, wanted and fits(obj))
         number = counted(len(chosen), "object")
-        return self.done(mark.marked.format(number) if wanted else f"{number} unmarked")
+        return self.done(marked.format(number) if wanted else f"{number} unmarked")
 
     def _wanted(self, marked: bool) -> bool:
         return self.action == 'MARK' or (self.action == 'TOGGLE' and not marked)
@@ -328,15 +326,8 @@ class TETFLORA_OT_use_as_species(Reporting, Operator, label="Use as Species", to
     def _stop(self, context: bpy.types.Context, found: list[Datablock]) -> set[str]:
         if not found:
             return self.refused("Select an object that is used as a species first")
-        species = {asset.identifier for one in found if (asset := _asset_of(one)) is not None}
+        species = {asset.identifier for one in found if (asset := species_shown(one)) is not None}
         number = sum(stop_using(one) > 0 for one in found)
         plants = sum(o.tetflora.is_plant and o.tetflora.species in species for o in context.scene.objects)
         rest = f"; {counted(plants, 'plant')} of it need another species" if plants else ""
         return self.done(f"{counted(number, 'asset')} no longer used as species{rest}")
-
-
-def _asset_of(datablock: Datablock) -> bpy.types.PropertyGroup | None:
-    found = asset_of(datablock)
-    if found is None and isinstance(datablock, bpy.types.Object) and datablock.instance_collection is not None:
-        return asset_of(datablock.instance_collection)
-    return found

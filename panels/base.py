@@ -7,7 +7,6 @@ from textwrap import wrap
 from typing import Any, NamedTuple
 
 import bpy
-from bpy.utils import units
 
 from ..tetflora_addon.blender.species.catalog import FALLBACK_ICON, icon_of
 from .help import draw_help
@@ -109,12 +108,6 @@ def draw_below(layout: bpy.types.UILayout, text: str, name: str = "") -> None:
     left.alignment = 'RIGHT'
     left.label(text=name)
     row.label(text=text)
-
-
-def shown_length(meters: float) -> str:
-    """A length in the scene's units, as its fields show it."""
-    unit = bpy.context.scene.unit_settings
-    return units.to_string(unit.system, 'LENGTH', meters * unit.scale_length, precision=2)
 
 
 def draw_properties(layout: bpy.types.UILayout, owner: bpy.types.bpy_struct, *names: str) -> None:

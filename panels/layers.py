@@ -3,6 +3,7 @@
 """Layers: one list of all that grows on the grounds of a scene, and what and where the active one is."""
 
 import bpy
+from bpy.utils import units
 
 from ..operators.layers import grounds_to_plant
 from ..tetflora_addon.blender.biomes.layers import GROUP, STAND, active_layer, is_due, is_gone, kind_of, plants_in
@@ -29,7 +30,7 @@ class TETFLORA_UL_layers(bpy.types.UIList):
     def draw_item(self, _context, layout, _data, item, _icon, _active_data, _active_property, _index, _flag) -> None:
         row, kind = layout.row(align=True), kind_of(item)
         row.use_property_split = False  # which would indent names
-        if kind is GROUP:
+        if kind == GROUP:
             row.prop(item, "folded", text="", emboss=False, icon='RIGHTARROW' if item.folded else 'DOWNARROW_HLT')
         elif item.biome:
             row.separator()
@@ -37,7 +38,7 @@ class TETFLORA_UL_layers(bpy.types.UIList):
         handle = row.row()
         handle.scale_x = 0.6
         base.Button("move_layer", 'GRIP', "", {"direction": 'DRAG', "layer": item.uid}).draw(handle, emboss=False)
-        row.prop(named, "name", text="", emboss=False, icon=kind.icon)
+        row.prop(named, "name", text="", emboss=False, icon=kind)
         right = row.row(align=True)
         right.alignment = 'RIGHT'
         due = is_due(item)  # then the number is about to change, and names need the room
@@ -159,11 +160,11 @@ def TETFLORA_PT_layers(layout: bpy.types.UILayout, context: bpy.types.Context) -
     owner, kind = rules_of(layer), kind_of(layer)
     if layer.kind == SCATTER:
         _draw_scatter(column, layer)
-    elif kind is STAND:
+    elif kind == STAND:
         _draw_stand(column, layer.field)
-    elif kind is GROUP:
+    elif kind == GROUP:
         column.prop(layer, "gives_way")
-    if (layer.kind != FIELD or kind is STAND) and (body := base.section(column, "Where", closed=False)):
+    if (layer.kind != FIELD or kind == STAND) and (body := base.section(column, "Where", closed=False)):
         names = [entry.object.name for entry in owner.grounds[:2] if entry.object is not None]
         more = len(owner.grounds) - 2
         base.draw_below(body, ", ".join(names) + (f" and {more:,} more" if more > 0 else "") or "None", "Ground")
@@ -220,7 +221,10 @@ def draw_distance(layout: bpy.types.UILayout, settings: bpy.types.PropertyGroup)
     layout.row(heading="Min Distance").prop(settings, "distance_by_species")
     if follows_species(settings):
         found = suggestion(settings, crown_to_draw)  # None for a moment, until the crowns of the species are known
-        base.draw_below(layout, "…" if found is None else base.shown_length(found))
+        unit, length = settings.id_data.unit_settings, "…"
+        if found is not None:
+            length = units.to_string(unit.system, 'LENGTH', found * unit.scale_length, precision=2)
+        base.draw_below(layout, length)
     else:
         layout.prop(settings, "min_distance", text=" ")
 

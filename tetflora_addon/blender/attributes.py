@@ -143,13 +143,18 @@ def _matrix_now(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Floats
     return own if parent is None else _matrix_now(parent, depsgraph) @ np.array(obj.matrix_parent_inverse) @ own
 
 
+def is_animated(datablock: bpy.types.ID | None) -> bool:
+    """Whether keys, drivers or strips animate a datablock."""
+    animation = getattr(datablock, "animation_data", None)
+    return animation is not None and bool(animation.action or animation.drivers or animation.nla_tracks)
+
+
 def moves(obj: bpy.types.Object | None) -> bool:
     """Whether anything may move an object or one of its parents, and motion blur is on for it."""
     if obj is not None and not getattr(getattr(obj, "cycles", None), "use_motion_blur", True):
         return False
     while obj is not None:
-        animation = obj.animation_data
-        if len(obj.constraints) or (animation and (animation.action or animation.nla_tracks or animation.drivers)):
+        if len(obj.constraints) or is_animated(obj):
             return True
         obj = obj.parent
     return False

@@ -31,7 +31,7 @@ def _use_cache(_preferences: object = None, _context: object = None) -> None:
         storage.set_folder(None if chosen.lower() == "off" else Path(chosen).absolute())
     else:
         used = own is not None and own.use_cache
-        storage.set_folder((_chosen("cache") or _extension_folder("cache")) if used else None)
+        storage.set_folder((_chosen("cache") or _cache_folder()) if used else None)
 
 
 class TetFloraPreferences(bpy.types.AddonPreferences):
@@ -96,15 +96,8 @@ def preferences() -> TetFloraPreferences | None:
 
 
 def species_folders() -> tuple[Path, ...]:
-    """Existing folders of the user's own species, for the catalog's functions; none outside of an extension.
-
-    Without a Species Folder in the preferences, that of the extension comes second: species used to be saved there.
-    """
-    own = preferences()
-    if own is None:
-        return ()
-    folders = (_chosen("species"),) if own.species_folder else (_lasting_folder(), _extension_folder("species"))
-    return tuple(folder for folder in folders if folder is not None and folder.is_dir())
+    """Existing folders of the user's own species, for the catalog's functions; none outside of an extension."""
+    return (folder,) if preferences() is not None and (folder := _species_folder()).is_dir() else ()
 
 
 def own_species_folder() -> Path:
@@ -117,7 +110,7 @@ def own_species_folder() -> Path:
     """
     if preferences() is None:
         raise SpeciesError("No folder for your own species; install TetFlora as an extension")
-    folder = _chosen("species") or _lasting_folder()
+    folder = _species_folder()
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
@@ -131,15 +124,15 @@ def _chosen(name: str) -> Path | None:
     return Path(bpy.path.abspath(chosen)) if chosen else None
 
 
-def _lasting_folder() -> Path:
-    """The folder of the user's own files that Blender neither updates nor deletes with the extension."""
-    return Path(bpy.utils.user_resource('DATAFILES', path="tetflora"))
+def _species_folder() -> Path:
+    """The folder in the preferences, or one that Blender neither updates nor deletes with the extension."""
+    return _chosen("species") or Path(bpy.utils.user_resource('DATAFILES', path="tetflora"))
 
 
-def _extension_folder(name: str) -> Path | None:
+def _cache_folder() -> Path | None:
     """A folder of the extension, which updates keep and its removal deletes; None for an add-on of the old kind."""
     try:
-        return Path(bpy.utils.extension_path_user(ROOT_PACKAGE, path=name))
+        return Path(bpy.utils.extension_path_user(ROOT_PACKAGE, path="cache"))
     except ValueError:
         return None
 

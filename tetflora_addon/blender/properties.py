@@ -19,7 +19,7 @@ from .runtime import Listeners, classes_in
 from .scene import objects
 from .scene.fields import stored_now
 from .scene.skeletons import SKELETON_TYPES
-from .settings import AnimationProperties, RefinementProperties
+from .settings import RefinementProperties
 from .species import asset_species, editor, edits
 from .species.catalog import SpeciesChoice, gallery_of
 from .stands import properties as stand_properties
@@ -37,6 +37,7 @@ _SKELETON = partial(
     poll=lambda _group, candidate: candidate.type in SKELETON_TYPES,
 )
 
+_AUTO_REFINE = {**FIXED, "update": lambda self, _context: auto_refine_switched.notify(self.id_data)}
 #: What overrides of linked objects may change; otherwise Blender forgets the change when the file is opened again.
 _OVERRIDES = {'LIBRARY_OVERRIDABLE'}
 
@@ -152,11 +153,7 @@ class TetFloraLeafObject(bpy.types.PropertyGroup, SpeciesChoice):
     )
 
 
-def _notify_auto_refine(self: bpy.types.PropertyGroup, _context: bpy.types.Context) -> None:
-    auto_refine_switched.notify(self.id_data)
-
-
-class TetFloraScene(RefinementProperties, AnimationProperties, library.BiomeChoice, bpy.types.PropertyGroup):
+class TetFloraScene(RefinementProperties, library.BiomeChoice, bpy.types.PropertyGroup):
     """Settings of a scene."""
 
     version: integer("Version", "Layout of these properties", **HIDDEN)
@@ -196,15 +193,13 @@ class TetFloraScene(RefinementProperties, AnimationProperties, library.BiomeChoi
         "Refine Automatically",
         "Refine shortly after the camera, plants or settings change, without blocking Blender. A further change "
         "restarts the work. While a viewport has Rendered shading, on by itself for what that shows",
-        update=_notify_auto_refine,
-        **FIXED,
+        **_AUTO_REFINE,
     )
     follow_viewport: boolean(
         "Follow Viewport",
         "Refine for what the 3D viewport shows instead of the scene camera: for the viewport with Rendered shading "
         "if there is one, else the largest. A viewport that looks through the camera shows what the camera sees",
-        update=_notify_auto_refine,
-        **FIXED,
+        **_AUTO_REFINE,
     )
     asset_detail: choice(
         "Asset Detail",

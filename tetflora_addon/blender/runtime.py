@@ -11,6 +11,7 @@ import sys
 import time
 from collections.abc import Callable, Generator, Iterable, Iterator
 from contextlib import contextmanager
+from dataclasses import dataclass
 from functools import cache, partial, wraps
 from math import inf
 from pathlib import Path
@@ -62,32 +63,20 @@ def listening(function: Callable[..., object], *listeners: Any) -> Part:
     return in_order(*(Part(partial(one.append, function), partial(one.remove, function)) for one in listeners))
 
 
-class Handlers:
-    """Functions that Blender calls, which stay registered when another file is loaded.
+def handlers(**functions: Callable[..., None] | tuple[Callable[..., None], ...]) -> Part:
+    """Functions that Blender calls, by their lists in `bpy.app.handlers`; they stay when another file is loaded."""
+    every = [
+        (compat.handlers(name), persistent(function))
+        for name, given in functions.items()
+        for function in (given if isinstance(given, tuple) else (given,))
+    ]
 
-    Parameters
-    ----------
-    **functions : callable or tuple of callable
-        By the name of their list in `bpy.app.handlers`.
-    """
+    def unregister() -> None:
+        for those, function in every:
+            if function in those:  # a script may have taken it away
+                those.remove(function)
 
-    def __init__(self, **functions: Callable[..., None] | tuple[Callable[..., None], ...]) -> None:
-        self._functions = [
-            (name, persistent(function))
-            for name, given in functions.items()
-            for function in (given if isinstance(given, tuple) else (given,))
-        ]
-
-    def register(self) -> None:
-        """Add them in order."""
-        for name, function in self._functions:
-            compat.handlers(name).append(function)
-
-    def unregister(self) -> None:
-        """Remove those that are still there."""
-        for name, function in self._functions:
-            if function in (there := compat.handlers(name)):
-                there.remove(function)
+    return Part(lambda: [those.append(function) for those, function in every], unregister)
 
 
 class Listeners(list):
@@ -160,7 +149,7 @@ class Outlook(Generic[_Result]):
                 call_soon(self._timer, max(0.2, 30.0 * min(self._took)))
 
         self.ask = ask
-        self._handlers = Handlers(depsgraph_update_post=ask, undo_post=ask, redo_post=ask, load_post=ask)
+        self._handlers = handlers(depsgraph_update_post=ask, undo_post=ask, redo_post=ask, load_post=ask)
         self.register = self._handlers.register
 
     def of(self, scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer) -> _Result | None:
@@ -188,38 +177,26 @@ class Outlook(Generic[_Result]):
         self._found = {}
 
 
+@dataclass(eq=False)
 class SceneSwitch:
     """What a switch of the window shows of one scene, made anew a moment after each change.
 
-    It belongs to the session: the scene is known by its `session_uid`, and forgotten when a file is loaded.
-
-    Parameters
-    ----------
-    name, label, tooltip : str
-        Of the switch, a property of the window manager.
-    make : callable
-        Makes it; gets the scene, or None where it is off or gone.
-    clear : callable
-        Takes away what was made.
-    soon : float
-        Seconds from a change; as many as making it took where that is more, or a slider that is dragged would stand.
-    drawn : bool
-        Whether there is nothing to make where no window draws it.
+    It belongs to the session, and is forgotten when a file is loaded.
     """
 
-    def __init__(
-        self,
-        name: str,
-        label: str,
-        tooltip: str,
-        make: Callable[[bpy.types.Scene | None], None],
-        clear: Callable[[], None],
-        soon: float,
-        drawn: bool,
-    ) -> None:
-        self._about, self._make, self._clear = (name, label, tooltip), make, clear
-        self._soon, self._drawn, self._took = soon, drawn, 0.0
-        self.scene: int | None = None
+    #: name, label, tooltip: Of the switch, a property of the window manager
+    name: str
+    label: str
+    tooltip: str
+    make: Callable[[bpy.types.Scene | None], None]  # gets the scene, or None where it is off or gone
+    clear: Callable[[], None]  # takes away what was made
+    #: Seconds from a change; as many as making it took where that is more, or a slider that is dragged would stand
+    soon: float
+    drawn: bool  # whether there is nothing to make where no window draws it
+    scene: int | None = None  # its `session_uid`
+
+    def __post_init__(self) -> None:
+        self._took = 0.0
         self.refresh = partial(self._refresh)  # one object, which Blender can find again
 
     def shown_in(self, scene: bpy.types.Scene) -> bool:
@@ -228,7 +205,7 @@ class SceneSwitch:
 
     def show(self, scene: bpy.types.Scene, on: bool) -> None:
         """Switch it on or off for a scene."""
-        self._clear()
+        self.clear()
         self.scene = scene.session_uid if on else None
         self.schedule()
 
@@ -239,33 +216,33 @@ class SceneSwitch:
 
     def look(self) -> None:
         """The same, or take it away where it is off."""
-        if not (self._drawn and bpy.app.background):
-            call_soon(self.refresh, max(self._soon, self._took))
+        if not (self.drawn and bpy.app.background):
+            call_soon(self.refresh, max(self.soon, self._took))
 
     def _refresh(self) -> None:
         begin = time.perf_counter()
-        self._make(with_uid(bpy.data.scenes, self.scene))
+        self.make(with_uid(bpy.data.scenes, self.scene))
         self._took = time.perf_counter() - begin
 
     def forget(self) -> None:
         """Forget the scene, and what was made."""
         self.scene = None
         call_off(self.refresh)
-        self._clear()
+        self.clear()
 
     def register(self) -> None:
         """Add the switch."""
-        name, *texts = self._about
         switch = once.boolean(
-            *texts,
+            self.label,
+            self.tooltip,
             get=lambda _: bpy.context.scene is not None and self.shown_in(bpy.context.scene),
             set=lambda _, on: self.show(bpy.context.scene, on),
         )
-        setattr(bpy.types.WindowManager, name, switch)
+        setattr(bpy.types.WindowManager, self.name, switch)
 
     def unregister(self) -> None:
         """Take it away, and what it shows."""
-        delattr(bpy.types.WindowManager, self._about[0])
+        delattr(bpy.types.WindowManager, self.name)
         self.forget()
 
 
@@ -312,10 +289,6 @@ class JobData:
         for obj in objects:
             self.add(f'"{obj.name}"', obj)
 
-    def forget(self, datablock: bpy.types.ID) -> None:
-        """Hold a datablock no more; given as the very object that was added."""
-        self._known = [own for own in self._known if own[0] is not datablock]
-
     def stop(self, reason: str) -> None:
         """Let the next `check` fail, whatever is there."""
         self._reason = self._reason or reason
@@ -355,12 +328,7 @@ _running: list[tuple[JobData, Generator]] = []
 def guarded(data: JobData, steps: Generator[Any, Any, _Result]) -> Generator[Any, Any, _Result]:
     """Run a job that must not outlive what it holds; after steps that wait, or are small, little is looked for.
 
-    Closing the steps has to leave everything as it was, whatever is gone.
-
-    Raises
-    ------
-    GoneError
-        Something is gone, or somebody stopped the job.
+    Closing the steps has to leave everything as it was, whatever is gone. Errors are those of `JobData.check`.
     """
     own, sent, waits = (data, steps), None, False
     _running.append(own)
@@ -404,7 +372,7 @@ def stop_jobs(reason: str) -> None:
             steps.close()
 
 
-_STOPPING = Handlers(
+_STOPPING = handlers(
     undo_pre=lambda *_: stop_jobs("Undo changed what it works on"),
     redo_pre=lambda *_: stop_jobs("Redo changed what it works on"),
     load_pre=(lambda *_: stop_jobs("another file was opened"), leave),

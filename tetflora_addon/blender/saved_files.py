@@ -22,7 +22,7 @@ import bpy
 from ..errors import SceneError, quoted
 from ..files import IDENTIFIER_RULE, PART, is_identifier, replace
 from ..formats import FORMATS
-from .runtime import Handlers, complain
+from .runtime import complain, handlers
 
 #: Of the properties of an object or a scene. Steps from earlier ones stand in `migrate`, when there are any.
 VERSION = FORMATS["properties"]
@@ -166,5 +166,4 @@ def migrate() -> None:
         )
 
 
-_HANDLERS = Handlers(save_post=_on_save_post)
-register, unregister = _HANDLERS.register, _HANDLERS.unregister
+register, unregister = handlers(save_post=_on_save_post)

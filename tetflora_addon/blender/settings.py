@@ -189,15 +189,10 @@ def check_limits(group: bpy.types.PropertyGroup, owner: str) -> None:
     Scripts that write custom properties, and files of any origin, can store them past Blender's own checks, and Blender
     takes nan for any number.
 
-    Parameters
-    ----------
-    owner : str
-        Named in the message.
-
     Raises
     ------
     SceneError
-        Names the setting, its value and the limits.
+        Names the owner, the setting, its value and the limits.
     """
     for prop in group.bl_rna.properties:
         if prop.type not in {'INT', 'FLOAT', 'ENUM'} or not group.is_property_set(prop.identifier):
@@ -248,7 +243,7 @@ def set_quality(group: bpy.types.PropertyGroup, number: int) -> None:
 
 
 class RefinementProperties(settings_in(RefinementSettings)):
-    """Refinement settings of a scene: the engine's, quality, and the look of shells."""
+    """Refinement settings of a scene: the engine's, quality, the look of shells, and what frames share."""
 
     quality: choice(
         "Quality",
@@ -265,10 +260,6 @@ class RefinementProperties(settings_in(RefinementSettings)):
     shell_spear: real("Shell Spear", "", 7.5, **{**_SHELL, "max": 1000.0})
     shell_roundness: real("Shell Roundness", "", 1.0, **_SHELL)
     shell_variation: real("Shell Variation", "", 0.05, **_SHELL)
-
-
-class AnimationProperties:
-    """Animation settings of a scene: what frames share, and the size of the frame cache."""
 
     share_frames: boolean(
         "Share Between Frames",

@@ -116,9 +116,9 @@ def test_trees_with_the_narrow_crowns_of_a_stand_have_its_few_leaves(kind):
         for attribute, value in (("tf_height", 20.0), ("tf_crown_width", width)):
             values = points.attributes.get(attribute) or points.attributes.new(attribute, 'FLOAT', 'POINT')
             values.data.foreach_set("value", np.full(20, value, np.float32))
-        forecast._counted.layer = None
+        forecast._layer = None
         _forecast()
-        stand = forecast._counted.stand
+        stand = forecast._stand
         leaves[name] = stand.number @ (np.array([crown.leaves for crown in stand.crowns])[stand.which] * stand.scale**2)
     assert 0.0 < leaves["narrow"] < 0.3 * leaves["free"]
 
@@ -128,7 +128,7 @@ def test_large_fields_are_known_by_a_sample():
     _wood(30_000, as_field='FIELD')
     found = _forecast()
     assert found.plants == 30_000
-    assert len(forecast._counted.stand.foot) == forecast._LOOKED_AT
+    assert len(forecast._stand.foot) == forecast._LOOKED_AT
     add_plant(species="oak")
     assert _forecast().plants == 30_001
 
@@ -140,7 +140,7 @@ def test_few_trees_are_not_lost_in_much_cover():
     for number in range(40):
         add_plant(f"p{number}", species="birch", location=(0.5 * number, 9.0, 0.0))
     assert _forecast().plants == 30_040
-    stand = forecast._counted.stand
+    stand = forecast._stand
     trees = stand.radius > 1.5
     assert 20 <= trees.sum() <= 40 and len(stand.foot) <= forecast._LOOKED_AT + 1
     assert stand.number[trees].sum() == pytest.approx(40.0)

@@ -263,10 +263,10 @@ def test_soil_has_snow_while_a_scene_has():
     _sheet(made)
     before, dark = _nodes(made.node_tree), _mean()
     _year(1.0)
-    snow.fit_soils()
+    snow.fit(bpy.data.materials)
     assert _mean().min() > 0.8 > 2 * dark.max()
     _year(0.0)
-    snow.fit_soils()
+    snow.fit(bpy.data.materials)
     assert _nodes(made.node_tree) == before
 
 

@@ -52,7 +52,7 @@ def test_a_new_population_stands_as_its_species_need_it():
     assert 3.0 <= _least_gap() < 3.6
     before = distances.distance_of(population)
     _choose(population, "oak")
-    assert rules.is_outdated(population)
+    assert rules.awaits_update(population)
     assert distances.distance_of(population) > 1.5 * before
 
 
@@ -70,7 +70,7 @@ def test_what_the_artist_sets_stays():
     assert distances.distance_of(population) == 0.0
     population.distance_by_species = True
     assert distances.distance_of(population) > 0.1
-    assert rules.is_outdated(population)
+    assert rules.awaits_update(population)
 
 
 def test_switching_off_keeps_the_distance_that_was_shown():
@@ -79,7 +79,7 @@ def test_switching_off_keeps_the_distance_that_was_shown():
     shown = distances.distance_of(population)
     population.distance_by_species = False
     assert population.min_distance == pytest.approx(shown)
-    assert not rules.is_outdated(population)
+    assert not rules.awaits_update(population)
     population.distance_by_species = False  # once more changes nothing
     _choose(population, "oak")
     assert distances.distance_of(population) == pytest.approx(shown)

@@ -354,4 +354,4 @@ def test_large_ground_has_no_more_plants_than_blender_bears():
     cover = _cover(soil=False)
     # Nearly as many stand as may: what finds no place, as litter far from its tree, takes none from the others.
     assert 0.8 * MOST < cover.made <= MOST
-    assert not rules.is_outdated(cover)
+    assert not rules.awaits_update(cover)

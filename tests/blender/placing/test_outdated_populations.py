@@ -19,7 +19,7 @@ def _population():
 
 
 def _outdated():
-    return rules.is_outdated(_population())
+    return rules.awaits_update(_population())
 
 
 def _populate():

@@ -217,9 +217,9 @@ def test_a_population_has_the_ages_of_its_rule(scene, store):
     assert 30.0 < np.median(found) < 50.0
     assert len(np.unique(found)) == made.number
     assert 0.4 < ((found > 40.0 / 1.3) & (found < 40.0 * 1.3)).mean() < 0.9
-    assert not rules.is_outdated(population)
+    assert not rules.awaits_update(population)
     population.age_spread = 0.0
-    assert rules.is_outdated(population)
+    assert rules.awaits_update(population)
     run_to_end(populations.make_plants_steps(scene, depsgraph(), population))
     assert {Kind.read(kind).age for kind in seeds(scene).identifiers} == {40.0}
 

@@ -75,7 +75,7 @@ def test_winter_is_bare_in_all_that_is_made(scene):
 def test_estimates_follow_the_day(scene):
     def expected(day):
         scene.tetflora.year.day = day
-        forecast._counted.stand = None
+        forecast._stand = None
         return forecast.forecast(scene, bpy.context.view_layer).primitives
 
     scene.tetflora.expand_everything = True

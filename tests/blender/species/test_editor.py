@@ -7,7 +7,6 @@ from __future__ import annotations
 import json
 import math
 import shutil
-from pathlib import Path
 
 import bpy
 import pytest
@@ -288,23 +287,15 @@ def test_a_broken_species_is_not_saved(own_folder):
 
 
 def test_the_default_folder_stays_when_the_extension_is_removed():
-    """Blender deletes a folder of the extension with it; species that were saved there are read, and give way."""
+    """Blender deletes a folder of the extension with it."""
     folder = preferences.own_species_folder()
-    old = Path(bpy.utils.extension_path_user(preferences.ROOT_PACKAGE, path="species", create=True))
     try:
         assert folder.is_relative_to(bpy.utils.user_resource('DATAFILES'))
         assert not folder.is_relative_to(bpy.utils.user_resource('EXTENSIONS'))
-        assert preferences.species_folders() == (folder, old)
-        page = json.loads(edits.catalog()["bush"].path.read_text("utf-8"))
-        for place, names in ((old, ("before", "both")), (folder, ("both", "since"))):
-            for name in names:
-                (place / f"{name}.json").write_text(json.dumps(page | {"name": f"{name} in {place.name}"}), "utf-8")
-        own = {info.name for info in edits.catalog().values() if info.path.parent in {folder, old}}
-        assert own == {f"before in {old.name}", f"both in {folder.name}", f"since in {folder.name}"}
+        assert preferences.species_folders() == (folder,)
         assert OWN_FILES.folder() == folder
     finally:
         shutil.rmtree(folder)
-        shutil.rmtree(old)
 
 
 def test_undo_takes_an_edit_back():

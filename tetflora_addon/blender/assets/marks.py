@@ -135,20 +135,16 @@ def size_of(variants: Iterable[tuple[Target, Floats]], depsgraph: bpy.types.Deps
     """Radius and height alone, as `measure` finds them, at a fraction of the cost; zeros where nothing has a face."""
     found = []
     for target, matrix in variants:
-        boxes = [_corners(low, high, matrix @ places) for low, high, places in _boxes(target, depsgraph)]
+        boxes = [(low, high, matrix @ places) for low, high, places in _boxes(target, depsgraph)]
         if boxes:
-            low = np.min([box.min(axis=(0, 1)) for box in boxes], axis=0)
-            found.append(_extent(low, np.max([box.max(axis=(0, 1)) for box in boxes], axis=0)))
+            found.append(_extent(*_around(boxes)))
     return tuple(np.mean(found, axis=0).tolist()) if found else (0.0, 0.0)
 
 
 def reach_of(target: Target, depsgraph: bpy.types.Depsgraph) -> float:
     """Distance from an asset's origin within which all of it lies, meters in its own space.
 
-    Raises
-    ------
-    SceneError
-        It instances itself.
+    Errors are those of `Target.parts`.
     """
     boxes = [np.linalg.norm(_corners(*box), axis=-1).max() for box in _boxes(target, depsgraph)]
     return float(max(boxes, default=0.0))
@@ -173,12 +169,15 @@ def _corners(low: NDArray, high: NDArray, places: Floats) -> Floats:
     return corner @ places[:, :3, :3].transpose(0, 2, 1) + places[:, None, :3, 3]
 
 
+def _around(boxes: list[tuple[NDArray, NDArray, Floats]]) -> tuple[Floats, Floats]:
+    """Extent (3,) of boxes in their places."""
+    corners = np.concatenate([_corners(*box) for box in boxes])
+    return corners.min(axis=(0, 1)), corners.max(axis=(0, 1))
+
+
 def _measured(meshes: list[_Mesh], picture: bool) -> dict[str, Any]:
     """Of a plant of scale 1: meters, number of faces, m², linear RGB, and a stored picture."""
-    low, high = np.full(3, np.inf), np.full(3, -np.inf)
-    for mesh in meshes:
-        box = _corners(mesh.low, mesh.high, mesh.places)
-        low, high = np.minimum(low, box.min(axis=(0, 1))), np.maximum(high, box.max(axis=(0, 1)))
+    low, high = _around([(mesh.low, mesh.high, mesh.places) for mesh in meshes])
     points, normals, colors = _sampled(meshes)
     radius, height = _extent(low, high)
     base = float(np.clip(np.quantile(points[:, 2], _BASE), 0.0, height)) if len(points) else 0.0
@@ -264,8 +263,6 @@ def use_as_species(
 
     Parameters
     ----------
-    scene : bpy.types.Scene
-        Receives the entry.
     datablock : bpy.types.Object or bpy.types.Collection
         Original; may be linked from a library.
     variants : bool
@@ -352,15 +349,16 @@ def _remove(entry: TetFloraAssetSpecies) -> None:
     entries.remove(next(i for i, other in enumerate(entries) if other.identifier == entry.identifier))
 
 
-def is_species(datablock: Datablock | None) -> bool:
+def is_species(datablock: Datablock) -> bool:
     """Whether an object or a collection is used as a species, or an empty shows one that is; cheap."""
-    if datablock is None:
-        return False
-    within = datablock.instance_collection if isinstance(datablock, bpy.types.Object) else None
-    if within is not None and asset_of(within) is not None:
-        return True
-    entry = asset_of(datablock)
+    entry = species_shown(datablock)
     return entry is not None and datablock_of(entry) is not None
+
+
+def species_shown(datablock: Datablock) -> TetFloraAssetSpecies | None:
+    """The species that an object or a collection is, or else that of the collection that an empty shows."""
+    within = getattr(datablock, "instance_collection", None)
+    return asset_of(datablock) or (None if within is None else asset_of(within))
 
 
 def scattered(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Scatter:

@@ -203,14 +203,12 @@ class _Parts:
 
     @staticmethod
     def _refuse_cycle(shown: bpy.types.Object | bpy.types.Collection, path: Trail) -> None:
-        if shown in path and isinstance(shown, bpy.types.Object):
-            raise SceneError(
-                f'"{shown.name}" instances itself, by way of "{path[-1].name}"; change what one of the two instances'
-            )
         if shown in path:
+            what = f'"{shown.name}" instances itself, by way of "{path[-1].name}"; '
+            if isinstance(shown, bpy.types.Object):
+                raise SceneError(f"{what}change what one of the two instances")
             raise SceneError(
-                f'The collection "{shown.name}" instances itself, by way of "{path[-1].name}"; take that object out of '
-                "the collection, or let it instance another one"
+                f"The collection {what}take that object out of the collection, or let it instance another one"
             )
 
     def _one_by_one(self, obj: bpy.types.Object, matrices: Floats) -> None:
@@ -446,16 +444,12 @@ class Places:
 def read_places(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> list[Places]:
     """Places of all assets of a view layer that render: first of plants, then of objects that scatter, by name.
 
+    Errors are those of `read_asset_plants`, `variants_of` and `read_scatters`.
+
     Parameters
     ----------
     depsgraph : bpy.types.Depsgraph
         In which originals are shown, as `results.hiding.originals_shown` does.
-
-    Raises
-    ------
-    SceneError
-        A transform that is not a number, a species whose collection has no object with faces, or a marked object of a
-        kind that cannot be read; the message names the object.
     """
     found = plant_places(scene, depsgraph)
     marked = sorted((o for o in renderable_objects(depsgraph.view_layer) if is_scatter(o)), key=lambda o: o.name_full)
@@ -500,7 +494,7 @@ def variants_of(entry: TetFloraAssetSpecies, depsgraph: bpy.types.Depsgraph) -> 
     found = [_as_it_stands(o, depsgraph) for o in objects]
     children = sorted(entry.collection.children, key=lambda c: c.name_full)
     found += [(_target(child), np.eye(4)) for child in children if not child.hide_render]
-    found = [variant for variant in found if shows_faces(variant[0], depsgraph)]
+    found = [variant for variant in found if any(variant[0].meshes(depsgraph))]
     if not found:
         raise SceneError(
             f'The collection "{entry.collection.name}", which is used as a species, has no object with faces; add some'
@@ -551,17 +545,6 @@ def read_scatters(objects: list[bpy.types.Object], depsgraph: bpy.types.Depsgrap
     for walk in found.values():
         walk.finish()
     return found
-
-
-def shows_faces(target: Target, depsgraph: bpy.types.Depsgraph) -> bool:
-    """Whether a target has any face.
-
-    Raises
-    ------
-    SceneError
-        It instances itself; the message names what does.
-    """
-    return any(True for _ in target.meshes(depsgraph))
 
 
 def _target(datablock: bpy.types.Object | bpy.types.Collection) -> Target:
@@ -616,7 +599,7 @@ class Scatter:
     def add(self, target: Target, places: Floats, keys: Keys) -> None:
         """Note places of an asset; of what has no faces only how many there are."""
         if target not in self._faces:
-            self._faces[target] = shows_faces(target, self.depsgraph)
+            self._faces[target] = any(target.meshes(self.depsgraph))
         if self._faces[target]:
             self._parts.setdefault(target, []).append((places, keys))
         else:

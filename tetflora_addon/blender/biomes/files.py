@@ -125,23 +125,19 @@ def checked(data: Any, identifier: str) -> Biome:
         check_text(f'"{key}"', data.get(key, ""))
     if not data["name"].strip():
         raise ValueError('"name" is empty')
-    known = {one.name for one in fields(Limits)}
-    check_keys('"limits"', data.get("limits", {}), set(), known)
-    check_settings('"limits"', data.get("limits", {}), TetFloraLayer, known)
-    check_keys('"mask"', data.get("mask", {}), set(), set(MASK))
-    check_settings('"mask"', data.get("mask", {}), TetFloraLayer, MASK)
+    for key, known in (("limits", {one.name for one in fields(Limits)}), ("mask", set(MASK))):
+        check_keys(f'"{key}"', data.get(key, {}), set(), known)
+        check_settings(f'"{key}"', data.get(key, {}), TetFloraLayer, known)
     check_value('"gives_way"', TetFloraLayer.bl_rna.properties["gives_way"], data.get("gives_way", True))
     ground = data.get("ground", {})
     check_keys('"ground"', ground, set(), set(GROUND))
     for key, value in ground.items():
-        default, low, high = GROUND[key]
-        if isinstance(default, float):
-            _check_number(f'"ground": "{key}"', value, low, high)
-            continue
-        if not isinstance(value, list) or len(value) != 3:
+        default, *limits = GROUND[key]
+        parts = [value] if isinstance(default, float) else value
+        if not isinstance(parts, list) or len(parts) != np.size(default):
             raise ValueError(f'"ground": "{key}" is {quoted(value)}; it must be three numbers')
-        for part in value:
-            _check_number(f'"ground": "{key}"', part, low, high)
+        for part in parts:
+            _check_number(f'"ground": "{key}"', part, *limits)
     season = data.get("season", {})
     check_keys('"season"', season, set(), set(SEASON))
     for key, value in season.items():
@@ -173,7 +169,7 @@ def biome_data(
     names = {part.get("shed_by", "") for part in parts} - {""}  # what they shed is made from them
     names |= {part["species"] for part in parts if not part["species"].startswith(part.get("shed_by", "?") + "_")}
     own = [name for name in sorted(names) if find_edit(scene, name) is not None]
-    data |= {"species": {name: dict(species_data(scene, name)) for name in own}} if own else {}
+    more: dict[str, Any] = {"species": {name: dict(species_data(scene, name)) for name in own}}
     if biome is not None:
         limits = limits_of_zone(biome)
         changed = {
@@ -181,12 +177,9 @@ def biome_data(
             for one in fields(Limits)
             if getattr(limits, one.name) not in (one.default, np.float32(one.metadata.get("default", one.default)))
         }
-        data |= {"limits": changed} if changed else {}
-        mask = settings_data(biome, MASK)
-        data |= {"mask": mask} if mask else {}
-        data |= {} if biome.gives_way else {"gives_way": False}
-    data["layers"] = [*stands, *layers]
-    return data
+        more |= {"limits": changed, "mask": settings_data(biome, MASK), "gives_way": biome.gives_way}
+    data |= {key: value for key, value in more.items() if value not in ({}, True)}  # what no file need say
+    return data | {"layers": [*stands, *layers]}
 
 
 def _stand_data(stand: bpy.types.Object) -> dict[str, Any]:
@@ -328,10 +321,7 @@ def save_biome(scene: bpy.types.Scene, name: str, description: str, picture: boo
 def import_biome(path: Path, replace: bool) -> str:
     """Take a file into the user's folder, with the picture beside it; returns the identifier.
 
-    Raises
-    ------
-    SceneError
-        The file breaks a rule of the format, or another one of its name is there.
+    Errors are those of `read_biome` and of `OwnFiles.store`.
     """
     library.OWN_FILES.store(path.stem, _read(path)[1], replace, library.picture_file(path))
     return path.stem

@@ -6,36 +6,25 @@ A biome is followed by the layers that it is made of, which know its identity. L
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import bpy
 
-from ..compat import stored_properties
 from ..placing.plant_objects import PAINTED_MARK, note_field, plant_collection
 from ..placing.populations import add_population
 from ..placing.rules import BIOME_ONLY, awaits_update, copy_settings, free_seed, grounds_of, set_grounds
-from ..runtime import Handlers
+from ..runtime import handlers
 from ..scene.fields import has_history, stored_size
 from ..settings import BIOME, FIELD, SCATTER, active_in, rules_of
 from ..stands.growing import stand_settings_now
 
-
-@dataclass(frozen=True)
-class LayerKind:
-    """What a layer is, as artists see it."""
-
-    name: str
-    icon: str
-
-
-SCATTERED, COVERING = LayerKind("Scatter", 'OUTLINER_OB_POINTCLOUD'), LayerKind("Cover", 'OUTLINER_OB_CURVES')
-GROUP, STAND = LayerKind("Biome", 'WORLD'), LayerKind("Stand", 'TIME')
-PAINTED, IMPORTED = LayerKind("Painted", 'BRUSH_DATA'), LayerKind("Imported", 'IMPORT')
+#: What layers are, by their icons.
+SCATTERED, COVERING, GROUP = 'OUTLINER_OB_POINTCLOUD', 'OUTLINER_OB_CURVES', 'WORLD'
+STAND, PAINTED, IMPORTED = 'TIME', 'BRUSH_DATA', 'IMPORT'
 Layer = bpy.types.PropertyGroup
 
 
-def kind_of(layer: Layer) -> LayerKind:
-    """What a layer is."""
+def kind_of(layer: Layer) -> str:
+    """What a layer is, as artists see it: its icon."""
     if layer.kind == SCATTER:
         return COVERING if layer.covers else SCATTERED
     if layer.kind == BIOME:
@@ -238,26 +227,10 @@ def bring_together(scene: bpy.types.Scene) -> None:
     scene.tetflora.layers_index = max(index_of(scene, shown), min(len(layers) - 1, 0))
 
 
-def _read_older(scene: bpy.types.Scene) -> None:
-    """Take over what a file from before there were layers keeps: populations, and biomes in a list of their own."""
-    stored = (stored_properties(scene) or {}).get("tetflora")
-    if stored is None or "populations" not in stored:
-        return
-    kinds = scene.tetflora.bl_rna.properties["layers"].fixed_type.properties["kind"].enum_items
-    biomes = [{**one.to_dict(), "kind": kinds[BIOME].value} for one in stored.get("biomes", ())]
-    layers = [*stored.get("layers", ()), *stored["populations"]]
-    stored["layers"] = biomes + [one.to_dict() for one in layers]
-    scene.tetflora.layers_index = len(biomes) + stored.get("populations_index", 0)
-    for name in ("populations", "populations_index", "biomes", "biomes_index"):
-        stored.pop(name, None)
-
-
 def _on_load(*_: object) -> None:
     for scene in bpy.data.scenes:
         if scene.library is None:
-            _read_older(scene)
             bring_together(scene)
 
 
-_HANDLERS = Handlers(load_post=_on_load)
-register, unregister = _HANDLERS.register, _HANDLERS.unregister
+register, unregister = handlers(load_post=_on_load)

@@ -35,7 +35,7 @@ from ..scene.plants import Source, merged, read_sources
 from ..scene.skeletons import skeleton_object_of
 from ..worker import call_in_thread, steps_in_thread
 from .surfaces import with_surfaces
-from .usd import ENDINGS, halves, library, write_usd
+from .usd import ENDINGS, library, stored_seeds, write_usd
 
 
 @dataclass(frozen=True)
@@ -127,28 +127,19 @@ def _faces(levels: Sequence[PlantLevel]) -> Floats:
     return np.array([polygons, sum(len(mesh.corner_verts) for mesh in meshes) - 2.0 * polygons])
 
 
-def read_plants(data: JobData) -> tuple[list[Source], Seeds]:
-    """Plants object by object, and all of them, one after another, with their kinds."""
-    sources = read_sources(data.scene, data.depsgraph)
-    aged = classed(data.scene, [source.part for source in sources])
-    return sources, merged([seeds for _, seeds in aged])
-
-
-def forest_parts(data: JobData, sources: Sequence[Source], seeds: Seeds, shown: Shown) -> Job[tuple[ForestPart, ...]]:
+def forest_parts(data: JobData, sources: Sequence[Source], shown: Shown) -> Job[tuple[ForestPart, ...]]:
     """Plants of each object as they are written."""
     made, first = [], 0
     for number, source in enumerate(sources):
         yield Progress(number / len(sources), f'plants of "{source.part[0]}"')
         some = slice(first, first + len(source.part[1]))
-        made.append(
-            _forest_part(data.depsgraph, source, seeds.take(some), shown.variant[some], shown.scale[some], shown)
-        )
+        made.append(_forest_part(data.depsgraph, source, shown.variant[some], shown.scale[some], shown))
         first = some.stop
     return tuple(made)
 
 
 def _forest_part(
-    depsgraph: bpy.types.Depsgraph, source: Source, grown: Seeds, variant: Integers32, scale: Floats, shown: Shown
+    depsgraph: bpy.types.Depsgraph, source: Source, variant: Integers32, scale: Floats, shown: Shown
 ) -> ForestPart:
     name, seeds, ages, sizes = source.part
     obj = source.field
@@ -196,13 +187,12 @@ def _points(
     position: Floats, rotation: Floats, seeds: Seeds, ages: Floats | None, sizes: Sizes | None
 ) -> PointAttributes:
     """Attributes of a field with some plants, in single precision."""
-    small = np.array_equal(seeds.seed, seeds.seed.astype(np.int32))
     found = {
         "position": ('FLOAT_VECTOR', position),
         "rotation": ('QUATERNION', rotation),
         "scale": ('FLOAT', seeds.scale.astype(np.float32)),
         "species": ('INT', seeds.species.astype(np.int32)),
-        "seed": ('INT', seeds.seed.astype(np.int32)) if small else ('INT32_2D', halves(seeds.seed)),
+        "seed": stored_seeds(seeds.seed),
     }
     if ages is not None:
         found[AGE] = 'FLOAT', ages.astype(np.float32)
@@ -264,7 +254,8 @@ def export_steps(data: JobData, order: ExportOrder) -> Job[Exported]:
         library()  # or it would say after minutes that there is none
     with written_whole(order.path) as folder:
         yield Progress(0.0, "reading plants")
-        sources, seeds = read_plants(data)
+        sources = read_sources(data.scene, data.depsgraph)
+        seeds = merged([seeds for _, seeds in classed(data.scene, [source.part for source in sources])])
         kinds = yield from part_of(kinds_of(data, seeds, order.variants), 0.05, 0.15)
         left = memory_left(data.scene)
         shown = yield from part_of(variants_of(seeds, kinds, order.levels, order.polygons, left), 0.15, 0.65)
@@ -272,7 +263,7 @@ def export_steps(data: JobData, order: ExportOrder) -> Job[Exported]:
         given = data.scene, shown.variants, folder, textures, order.bake
         variants = yield from part_of(with_surfaces(*given), 0.65, 0.75)
         data.check()
-        parts = yield from part_of(forest_parts(data, sources, seeds, shown), 0.75, 0.8)
+        parts = yield from part_of(forest_parts(data, sources, shown), 0.75, 0.8)
         forest = Forest(variants, parts)
         progress = Progress(0.8, f"writing {order.path.name}")
         steps = (Progress(0.8 + 0.2 * part, progress.message) for part in writer(folder / order.path.name, forest))

@@ -243,9 +243,13 @@ def _material_of(scene: bpy.types.Scene, look: _Look) -> tuple[bpy.types.Materia
 def _details(material: bpy.types.Material, look: _Look) -> dict[str, Floats32]:
     """What is baked of a material, as cells have it."""
     is_bark = look.part == "bark"
-    low = look.palette.low + np.array([0.0, _ABOVE * is_bark])
-    given = (low, look.palette.size, 1.0 if is_bark else _meters(look.meshes[0]))
-    images = baked(material, look.color, look.mean("tf_transmission"), TEXELS, *given)
+    low, meters = look.palette.low + np.array([0.0, _ABOVE * is_bark]), 1.0
+    if not is_bark:  # of its faces' edges, so that relief is as deep on them
+        corner, mesh = corner_triangles(look.meshes[0])[1][:, :2], look.meshes[0]
+        uv, place = mesh.attributes["UVMap"][1][corner], mesh.positions[mesh.corner_verts[corner]]
+        flat, long = (np.linalg.norm(of[:, 1] - of[:, 0], axis=1).sum() for of in (uv, place))
+        meters = float(long / max(flat, 1e-9))
+    images = baked(material, look.color, look.mean("tf_transmission"), TEXELS, low, look.palette.size, meters)
     return {name: tiled(own) if is_bark else within(own) for name, own in images.items()}
 
 
@@ -295,14 +299,6 @@ def _written(files: dict[str, Floats32], name: str, folder: Path, textures: str)
         (folder / names[key]).write_bytes(png(texels, linear))
         (folder / textures / f"{name}_{key}_half.png").write_bytes(png(halved(texels), linear))
     return names
-
-
-def _meters(mesh: MeshBuffers) -> float:
-    """Meters to a unit of texture coordinates: of its faces' edges, so that relief is as deep on them."""
-    corner = corner_triangles(mesh)[1][:, :2]
-    uv, place = mesh.attributes["UVMap"][1][corner], mesh.positions[mesh.corner_verts[corner]]
-    flat, long = (np.linalg.norm(of[:, 1] - of[:, 0], axis=1).sum() for of in (uv, place))
-    return float(long / max(flat, 1e-9))
 
 
 #: What is baked of a material: Blender's name, and whether it is a color.

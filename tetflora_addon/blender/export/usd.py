@@ -45,13 +45,7 @@ _NAMES = {'FLOAT': "Float", 'INT': "Int", 'INT32_2D': "Int2", 'FLOAT_VECTOR': "F
 
 
 def library() -> SimpleNamespace:
-    """USD's modules.
-
-    Raises
-    ------
-    TetFloraError
-        This Blender has none.
-    """
+    """USD's modules; a `TetFloraError` where this Blender has none."""
     if (found := usd()) is None:
         raise TetFloraError("This Blender was built without USD; choose glTF or OBJ, or use another build")
     return found
@@ -138,19 +132,20 @@ def _write_part(pxr: SimpleNamespace, stage: object, path: str, part: ForestPart
 
 def _columns(part: ForestPart) -> dict[str, tuple[str, NDArray]]:
     """What every plant is, for whoever reads the file."""
-    small = np.array_equal(part.seed, part.seed.astype(np.int32))
-    seed = ('INT', part.seed.astype(np.int32)) if small else ('INT32_2D', halves(part.seed))
     return {
         "species": ('INT', part.species),
-        "seed": seed,
+        "seed": stored_seeds(part.seed),
         "age": ('FLOAT', part.age),
         "height": ('FLOAT', part.height),
     }
 
 
-def halves(seed: Integers) -> NDArray[np.int32]:
-    """Seeds (n,) of 64 bits as two numbers each, (n, 2)."""
-    return np.ascontiguousarray(seed, np.int64).view(np.int32).reshape(-1, 2)
+def stored_seeds(seed: Integers) -> tuple[str, NDArray[np.int32]]:
+    """Type of an attribute and values of seeds (n,): of more than 32 bits as two numbers each, (n, 2)."""
+    small = seed.astype(np.int32)
+    if np.array_equal(seed, small):
+        return 'INT', small
+    return 'INT32_2D', np.ascontiguousarray(seed, np.int64).view(np.int32).reshape(-1, 2)
 
 
 def _add(pxr: SimpleNamespace, primvars: object, name: str, kind: str, values: NDArray) -> None:
@@ -328,7 +323,7 @@ _TRANSFORM = {"rotation_mode", "location", "rotation_euler", "rotation_quaternio
 
 @importing
 def forest_steps(order: Import, mix: Mapping[str, float]) -> Steps:
-    """Make a field for each object whose plants a file holds; yields progress. Closing the steps leaves all as it was.
+    """Make a field for each object whose plants a file holds; see `importing`.
 
     Parameters
     ----------

@@ -162,7 +162,15 @@ Steps = Job[Imported]
 
 
 def importing(steps: Callable[..., Steps]) -> Callable[..., Steps]:
-    """Make a guarded job of the steps of an `Import`: what they work on may be deleted between two of them."""
+    """Make a guarded job of the steps of an `Import`: what they work on may be deleted between two of them.
+
+    They yield progress; closing them leaves all as it was.
+
+    Raises
+    ------
+    SceneError
+        The file cannot be read, is broken, or cannot lie in this scene.
+    """
 
     def read(order: Import, *others: Any, **named: Any) -> Steps:
         try:

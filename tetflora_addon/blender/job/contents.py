@@ -154,15 +154,10 @@ def read_scene(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> SceneC
 
 
 def compile_for(identifiers: tuple[str, ...], scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> Flora:
-    """Load and compile species, leaf objects of the scene included.
+    """Load and compile species, leaf objects of the scene included; errors are those of `resolved_species`.
 
     Without any, for meshes alone, it is a shipped one of which nothing grows: the artist's own files and edits that the
     scene does not use must not take time or raise errors.
-
-    Raises
-    ------
-    SpeciesError
-        Unknown or broken species, or a leaf object that is missing or not a mesh with faces.
     """
     return compile_species(load_for(identifiers, scene, depsgraph))
 
@@ -206,13 +201,7 @@ def estimate(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> Statisti
 
 
 def check_settings(scene: bpy.types.Scene) -> None:
-    """Refuse settings of a scene that are beyond their limits.
-
-    Raises
-    ------
-    SceneError
-        Names the setting, its value and the limits.
-    """
+    """Refuse settings of a scene that are beyond their limits; errors are those of `check_limits`."""
     for group in (scene.tetflora, scene.tetflora.wind, scene.tetflora.year, scene.tetflora.output):
         check_limits(group, f'Scene "{scene.name}"')
 
@@ -323,7 +312,7 @@ def is_plain(scene: bpy.types.Scene, places: Sequence[Places], depsgraph: bpy.ty
     if not places or scene.tetflora.asset_detail == 'REFINE':
         return not places
     targets, costs = _costs(places, depsgraph)
-    return not targets or costs.plain(_in_cycles(scene), left)
+    return not targets or costs.plain(scene.render.engine == 'CYCLES', left)
 
 
 def bind_steps(
@@ -345,7 +334,8 @@ def bind_steps(
         yield progress
         assets.append((yield from _compiled(scene, target, depsgraph, progress)))
     index = {target: i for i, target in enumerate(targets)}
-    owners = list(dict.fromkeys(_owner(one) for one in places))
+    shown = [one.owner if len(one.owners) == 1 else None for one in places]
+    owners = list(dict.fromkeys(shown))
     matrices = np.concatenate([one.matrices for one in places])
     number = [len(one) for one in places]
     instances = Instances(
@@ -355,18 +345,11 @@ def bind_steps(
         np.concatenate([one.keys for one in places]),
     )
     placed = PlacedAssets(AssetTable.of(assets), instances)
-    owner = np.repeat([owners.index(_owner(one)) for one in places], number).astype(np.int32)
+    owner = np.repeat([owners.index(one) for one in shown], number).astype(np.int32)
     _, costs = _costs(places, depsgraph, _covered(placed, camera))
-    originals = costs.originals(_in_cycles(scene), left, always=scene.tetflora.asset_detail == 'AUTO')
+    in_cycles, always = scene.render.engine == 'CYCLES', scene.tetflora.asset_detail == 'AUTO'
+    originals = costs.originals(in_cycles, left, always=always)
     return SceneAssets(tuple(targets), placed, matrices, tuple(owners), owner, originals)
-
-
-def _owner(places: Places) -> bpy.types.Object | None:
-    return places.owner if len(places.owners) == 1 else None
-
-
-def _in_cycles(scene: bpy.types.Scene) -> bool:
-    return scene.render.engine == 'CYCLES'
 
 
 def _costs(

@@ -7,7 +7,7 @@ often than a few hundredths of the time allow; never while a panel is drawn.
 """
 
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import bpy
 import numpy as np
@@ -22,7 +22,7 @@ from ...growth.seasons import PRESENT, expected_of
 from ...processes import pool
 from ...species.kinds import Kind, species_of
 from ..attributes import read, values_of
-from ..runtime import Handlers, Outlook, in_order
+from ..runtime import Outlook, handlers, in_order
 from ..scene.ages import crown_kinds
 from ..scene.camera import read_camera
 from ..scene.crowns import crown_to_draw
@@ -36,15 +36,8 @@ _LOOKED_AT = 2_000  # plants of each kind of storage that stand for all
 _GIGA, _MEGA = memory.GIGABYTE, 1e6
 
 
-@dataclass
-class _Counted:
-    """The stand of one view layer; of none where that has changed."""
-
-    layer: tuple[str, str] | None = None
-    stand: Stand | None = None
-
-
-_counted = _Counted()
+_layer: tuple[int, str] | None = None  # whose stand was counted; of none where that has changed
+_stand: Stand | None = None
 _learned = 1.0  # what refining took here last over what was expected
 
 
@@ -53,14 +46,13 @@ def forecast(scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer) -> Estimat
 
     None without plants, where the camera cannot be used, and in a window for a moment, until crowns are known.
     """
-    depsgraph = view_layer.depsgraph
+    global _layer, _stand
+    depsgraph, layer = view_layer.depsgraph, (scene.session_uid, view_layer.name)
     if depsgraph is None or scene.camera is None:
         return None
-    layer = scene.session_uid, view_layer.name
-    if _counted.stand is None or _counted.layer != layer:
-        _counted.stand, _counted.layer = _count(scene, view_layer), layer
-    stand = _counted.stand
-    if stand is None or not len(stand.number):
+    if _stand is None or _layer != layer:
+        _stand, _layer = _count(scene, view_layer), layer
+    if _stand is None or not len(_stand.number):
         return None
     try:
         check_settings(scene)
@@ -71,7 +63,7 @@ def forecast(scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer) -> Estimat
     processes = pool.number(memory.limit(most_memory(scene)))
     allowed = memory_left(scene, camera)
     everything = scene.tetflora.expand_everything
-    return estimate(stand, camera, settings_from(scene), used, allowed, everything, processes)
+    return estimate(_stand, camera, settings_from(scene), used, allowed, everything, processes)
 
 
 def learn(expected: Estimate | None, seconds: float) -> None:
@@ -98,7 +90,7 @@ def _text_for(scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer) -> str:
     found = forecast(scene, view_layer)
     if found is None:
         # Plants are there, and their crowns are being looked for.
-        return "" if _counted.stand is not None or scene.camera is None else "Estimating…"
+        return "" if _stand is not None or scene.camera is None else "Estimating…"
     size = found.memory / _GIGA
     taken = seconds_text(seconds_here(found)), polygons_text(found.primitives), f"{size:.{int(size < 10.0)}f} GB"
     text = f"About {', '.join(taken)}"
@@ -259,15 +251,16 @@ def stored(points: bpy.types.Mesh | bpy.types.PointCloud, name: str, chosen: Int
 
 
 def _on_change(*_: object) -> None:
-    _counted.layer = None
+    global _layer
+    _layer = None
 
 
 def _on_load(*_: object) -> None:
-    global _learned
-    _counted.stand, _learned = None, 1.0
+    global _stand, _learned
+    _stand, _learned = None, 1.0
 
 
-_HANDLERS = Handlers(depsgraph_update_post=_on_change, undo_post=_on_change, redo_post=_on_change, load_post=_on_load)
+_HANDLERS = handlers(depsgraph_update_post=_on_change, undo_post=_on_change, redo_post=_on_change, load_post=_on_load)
 #: By now crowns may be known, or memory short.
 _outlook = Outlook(_text_for, old=2.0)
 

@@ -19,6 +19,7 @@ from ...growth.seeds import farthest
 from ...species.kinds import species_of
 from ..assets.marks import reach_of
 from ..assets.places import digest_of
+from ..attributes import is_animated
 from ..compat import drawn_disc
 from ..materials.snow import has_snow
 from ..preferences import preferences
@@ -177,18 +178,13 @@ def camera_moves(scene: bpy.types.Scene) -> bool:
     It depends on the file alone, so that a frame is refined in the same way within an animation and alone.
     """
     carrier = scene.camera
-    if carrier is not None and _is_animated(carrier.data):
+    if carrier is not None and is_animated(carrier.data):
         return True
     while carrier is not None:
-        if _is_animated(carrier) or any(not constraint.mute for constraint in carrier.constraints):
+        if is_animated(carrier) or any(not constraint.mute for constraint in carrier.constraints):
             return True
         carrier = carrier.parent
     return False
-
-
-def _is_animated(datablock: bpy.types.ID | None) -> bool:
-    animation = getattr(datablock, "animation_data", None)
-    return animation is not None and bool(animation.action or animation.drivers or animation.nla_tracks)
 
 
 def key_of(

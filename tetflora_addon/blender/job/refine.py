@@ -18,7 +18,7 @@ import bpy
 import numpy as np
 
 from ... import memory
-from ...arrays import Integers, Integers32, Keys, Mask
+from ...arrays import Integers, Integers32, Keys
 from ...assets.measures import kite_mesh
 from ...buffers import MeshBuffers, concatenate_buffers
 from ...camera.camera import Camera, origin_near
@@ -90,14 +90,6 @@ class _Run:
     whole: tuple[Camera, RefinementSettings] | None = None  # of what a first look stands for
 
 
-def left_alone(bound: contents.SceneAssets, plan: AssetPlan) -> Mask:
-    """Owners (k,) of which every instance is the original: they go on showing them themselves."""
-    whole = np.zeros(len(bound.placed), bool)
-    whole[plan.originals] = True
-    number = np.bincount(bound.owner, ~whole, len(bound.owners))
-    return (number == 0) & np.array([_scatters(owner) for owner in bound.owners], bool)
-
-
 def _scatters(owner: bpy.types.Object | None) -> bool:
     """Whether an object shows its instances itself; plants do not."""
     return owner is not None and not owner.tetflora.is_plant and not owner.tetflora.is_field
@@ -123,8 +115,12 @@ def _ids(keys: Keys) -> Integers32:
 def write_assets(run: _Run, plan: AssetPlan) -> Job[None]:
     """Write what a plan draws as instances."""
     results, bound, statistics = run.results, run.bound, run.statistics
-    alone = left_alone(bound, plan)
     asset, owner = bound.placed.instances.asset, bound.owner
+    # Objects of which every instance is the original go on showing them themselves.
+    changed = np.ones(len(bound.placed), bool)
+    changed[plan.originals] = False
+    alone = np.bincount(owner, changed, len(bound.owners)) == 0
+    alone &= np.array([_scatters(one) for one in bound.owners], bool)
     ids = _ids(bound.placed.instances.key)
     progress = Progress(0.94, "Placing instances")
     yield progress
@@ -162,8 +158,13 @@ Maker = Callable[[int, str], Generator[None, None, tuple[bpy.types.Mesh, int]]]
 
 def _clusters(run: _Run, target: int) -> Maker:
     """What makes meshes of clusters of their own faces, with the number of these."""
+    surfaces, numbers, matrices = [], [], []  # numbered as those of its `AssetSource`
     with originals_shown(run.results.scene, run.depsgraph):
-        meshes = read_meshes(run.bound.targets[target], run.depsgraph)
+        for part, *one in run.bound.targets[target].meshes(run.depsgraph):
+            numbers += [len(surfaces)] * len(part.matrices)
+            surfaces.append(read_mesh(*one))
+            matrices.append(part.matrices)
+    meshes = AssetMeshes(surfaces, np.array(numbers, np.int32), np.concatenate(matrices))
     asset = run.bound.placed.assets.every[target]
 
     def make(cluster: int, name: str) -> Generator[None, None, tuple[bpy.types.Mesh, int]]:
@@ -219,16 +220,6 @@ def _write_clusters(
         places = pick[rows].astype(np.int32), bound.matrices[at], ids[at]
         add_cluster_instances(results, f"{name} clusters {number:03d}", objects, *places, bound.owners[who])
     run.statistics.instances_clusters += len(cluster)
-
-
-def read_meshes(target: Target, depsgraph: bpy.types.Depsgraph) -> AssetMeshes:
-    """All surfaces of an asset, numbered as those of its `AssetSource`."""
-    surfaces, numbers, matrices = [], [], []
-    for part, *one in target.meshes(depsgraph):
-        numbers += [len(surfaces)] * len(part.matrices)
-        surfaces.append(read_mesh(*one))
-        matrices.append(part.matrices)
-    return AssetMeshes(surfaces, np.array(numbers, np.int32), np.concatenate(matrices))
 
 
 def _write_blocks(
@@ -476,17 +467,12 @@ def refine(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, **options: ob
 
 
 def clear(scene: bpy.types.Scene, for_render: bool | None = None) -> int:
-    """Remove only what refinement made for a scene.
+    """Remove only what refinement made for a scene; how many datablocks.
 
     Parameters
     ----------
     for_render : bool, optional
         Only what was made for a render (True), only what the artist made (False), or both (None).
-
-    Returns
-    -------
-    int
-        Number of datablocks removed.
     """
     removed = remove_results(scene, {None: None, True: 'RENDER', False: 'VIEW'}[for_render])
     if not for_render:

@@ -26,7 +26,7 @@ from ..results import hiding
 from ..results.collection import has_results, leave_out_of_file, result_collections
 from ..results.output import KIND, adopt_materials, release_materials
 from ..results.proxy_kinds import raise_settings
-from ..runtime import Handlers, Listeners, complain, failed_frames, remember, with_uid
+from ..runtime import Listeners, complain, failed_frames, handlers, remember, with_uid
 from ..saved_files import clear_unreadable, migrate
 from ..scene.objects import has_contents, has_plants, show_in, view_layer_groups
 from ..scene.plants import NoPlantsError
@@ -260,7 +260,7 @@ def _complain(scene: bpy.types.Scene, message: str) -> None:
     complain(text)
 
 
-_HANDLERS = Handlers(
+register, unregister = handlers(
     render_init=on_render_init,
     render_pre=on_render_pre,
     render_complete=on_render_end,
@@ -270,4 +270,3 @@ _HANDLERS = Handlers(
     save_post_fail=on_save_post,
     load_post=on_load_post,
 )
-register, unregister = _HANDLERS.register, _HANDLERS.unregister

@@ -189,7 +189,8 @@ def bark_group(character: str) -> bpy.types.NodeTree:
 
     def build(graph: Graph, given: dict[str, Term]) -> dict[str, Any]:
         where = graph.outputs("ShaderNodeGroup", node_tree=place_group())
-        girth = base_girth(graph)
+        girth = graph.attribute("tf_girth", "Fac")
+        girth = (girth < 1e-6) * _USUAL + girth
         scale = given["Scale"] * (girth / _USUAL) ** bark.power
         cells = where["Place"] * graph.xyz(scale, scale, scale / given["Stretch"])
         place = Place(where["Place"], cells, where["Turn"], where["Along"], scale, given["Stretch"], girth)
@@ -201,7 +202,9 @@ def bark_group(character: str) -> bpy.types.NodeTree:
         change = (tone / bark.mean - (1.0, 1.0, 1.0)) * (given["Contrast"] * age) + (1.0, 1.0, 1.0)
         color = graph.tinted(given["Color"], change)
         if bark.moss or bark.lichen:
-            color = growth_part(graph, color, place, age, given["Moss"], given["Lichen"])
+            asked = {"Color": color, "Round": place.round, "Along": place.along, "Girth": place.girth, "Age": age}
+            asked |= {name: given[name] for name in ("Moss", "Lichen")}
+            color = graph.part("TetFlora Bark Growth", _VERSION, asked, (("Color", 'Color'),), _grown)["Color"]
         # Thickness must not be part of the height, whose slope alone is wanted.
         depth = where["Perimeter"] / (scale * tau) * given["Depth"] * age
         bump = graph.node("ShaderNodeBump", {"Strength": 1.0, "Distance": depth, "Height": height})
@@ -229,23 +232,11 @@ def pattern_part(graph: Graph, character: str, place: Place) -> dict[str, Term]:
     return graph.part(name, _VERSION, inputs, (("Tone", 'Color'), ("Height", 'Float')), build)
 
 
-def base_girth(graph: Graph) -> Term:
-    """Length around the branch at its base, meters; a usual one where the mesh does not say."""
-    girth = graph.attribute("tf_girth", "Fac")
-    return (girth < 1e-6) * _USUAL + girth
-
-
-def growth_part(graph: Graph, color: Term, place: Place, age: Term, moss: Term, lichen: Term) -> Term:
+def _grown(graph: Graph, given: dict[str, Term]) -> dict[str, Term]:
     """Group "TetFlora Bark Growth" of all barks: moss where it is damp, lichen where a noise is low.
 
     Both are as light as the bark beneath, so that the mean stays.
     """
-    given = {"Color": color, "Round": place.round, "Along": place.along, "Girth": place.girth, "Age": age}
-    given |= {"Moss": moss, "Lichen": lichen}
-    return graph.part("TetFlora Bark Growth", _VERSION, given, (("Color", 'Color'),), _grown)["Color"]
-
-
-def _grown(graph: Graph, given: dict[str, Term]) -> dict[str, Term]:
     age, color = given["Age"], given["Color"]
     radii = given["Girth"] / tau
     noise = graph.noise(given["Round"] * (radii * _PATCHES), 4.0, 0.65)[0]

@@ -264,10 +264,6 @@ class Plan:
         self.texels = max(self.texels, float(np.sqrt(pyramid.width[0] * pyramid.height[0])) * scale)
         return pyramid
 
-    def mark_uneven(self) -> None:
-        """Note that the mean of what comes out is not what comes out for the mean."""
-        self.uneven = True
-
     def unknown(self) -> None:
         """Note that only a renderer knows what comes out of a node."""
         self.tell(
@@ -463,14 +459,9 @@ class MeshLooks:
             attribute = mesh.attributes[name]
             values = values_of(attribute, "color" if attribute.data_type in _COLORS else "")
             self._values[name] = attribute.domain, values.reshape(len(values), -1)
-        # Without the attribute all faces are of the first slot.
-        self._slot = read(mesh, "material_index") if "material_index" in types and len(materials) > 1 else None
-
-    def slots(self, start: int, end: int) -> Integers32:
-        """Slot of some faces."""
-        if self._slot is None:
-            return np.zeros(end - start, np.int32)
-        return np.clip(self._slot[start:end], 0, len(self.plans) - 1)
+        self._slot = np.zeros(len(mesh.polygons), np.int32)  # without the attribute all faces are of the first one
+        if "material_index" in types:
+            self._slot = np.clip(read(mesh, "material_index"), 0, len(materials) - 1)
 
     def steps(
         self, faces: int, positions: Floats32, loops: Integers32, corner_verts: Integers32, face: Integers32
@@ -491,7 +482,7 @@ class MeshLooks:
         if not any(plan.names for plan in self.plans):
             constant = np.array([plan.constant for plan in self.plans])
             for low in range(0, faces, _TRIANGLES):
-                slot = self.slots(low, min(low + _TRIANGLES, faces))
+                slot = self._slot[low : low + _TRIANGLES]
                 self._write(made, slice(low, low + len(slot)), constant[slot], slot)
             return made
         most = max(_POINTS, _ALL_POINTS // -(-len(face) // _TRIANGLES)) if len(face) else 0
@@ -503,7 +494,7 @@ class MeshLooks:
             chosen = loops[start:end]
             verts = np.take(corner_verts, chosen)
             of_face = face[start:end] - low
-            slot = self.slots(low, high)
+            slot = self._slot[low:high]
             values = self._triangles(chosen, verts, face[start:end], slot[of_face], most)
             if high - low < end - start:
                 # Means over faces of those over their triangles.
@@ -573,13 +564,7 @@ class Looks:
         self._reader = FaceReader(_FEW_TEXELS)
 
     def of(self, material: bpy.types.Material | None, attributes: dict[str, NDArray]) -> Look:
-        """Look of a material.
-
-        Parameters
-        ----------
-        attributes : mapping of str to (n, k) float32
-            Of the mesh that wears it, for those that take their color from one.
-        """
+        """Means over a material, which may take its color from attributes (n, k) float32 of the mesh that wears it."""
         if material is None:
             return Look()
         types = {name: 'FLOAT2' if values.shape[1] == 2 else 'FLOAT_VECTOR' for name, values in attributes.items()}

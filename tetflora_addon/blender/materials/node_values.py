@@ -405,7 +405,7 @@ class NodeValues:
 
     def _blend(self, kind: str, a: Values, b: Values, factor: Values) -> Values:
         if kind not in {'MIX', 'MULTIPLY', 'ADD', 'SUBTRACT', 'SCREEN', 'LINEAR_LIGHT'}:
-            self._points.mark_uneven()
+            self._points.uneven = True
         return BLENDS[kind](a, b, factor)
 
     def _of_hue_sat(self, node, _socket, stack) -> Values:
@@ -452,11 +452,11 @@ class NodeValues:
         if work is None:
             return self._unknown(node, socket, stack)
         if node.operation in STEPS:
-            self._points.mark_uneven()
+            self._points.uneven = True
         return work(*(read(node, socket.identifier, stack) for socket in operands))
 
     def _of_valtorgb(self, node, socket, stack) -> Values:
-        self._points.mark_uneven()
+        self._points.uneven = True
         table = self._table(node.color_ramp, node.color_ramp.evaluate)
         made = _looked_up(table, self.number(node, "Fac", stack))
         return made[3] if socket.identifier == "Alpha" else made[:3]
@@ -489,7 +489,7 @@ class NodeValues:
     def _of_map_range(self, node, socket, stack) -> Values:
         if node.data_type != 'FLOAT' or node.interpolation_type == 'STEPPED':
             return self._unknown(node, socket, stack)
-        self._points.mark_uneven()
+        self._points.uneven = True
         keys, kind = ("Value", "From Min", "From Max", "To Min", "To Max"), node.interpolation_type
         value, low, high, to_low, to_high = (self.number(node, key, stack) for key in keys)
         x = _ratio(value - low, high - low)
@@ -502,7 +502,7 @@ class NodeValues:
 
     def _of_clamp(self, node, _socket, stack) -> Values:
         value, low, high = (self.number(node, key, stack) for key in ("Value", "Min", "Max"))
-        self._points.mark_uneven()
+        self._points.uneven = True
         return np.minimum(np.maximum(value, low), high)
 
     def _of_rgbtobw(self, node, _socket, stack) -> Values:

@@ -4,6 +4,7 @@
 
 from collections.abc import Callable, Iterator, Sequence
 from functools import partialmethod
+from graphlib import TopologicalSorter
 from typing import Any, Self, TypeVar
 
 import bpy
@@ -138,16 +139,10 @@ class Term:
 
 
 class Graph:
-    """A node tree under construction.
+    """A node tree under construction; if it is fresh, it is emptied first.
 
     Sockets are found by identifier or, for the sockets of groups, by name: identifiers stayed the same where 5.x
     renamed "Fac" to "Factor".
-
-    Parameters
-    ----------
-    tree : bpy.types.NodeTree
-    fresh : bool
-        Whether it is emptied first.
     """
 
     def __init__(self, tree: bpy.types.NodeTree, fresh: bool = True) -> None:
@@ -272,16 +267,12 @@ class Graph:
         """Lay the nodes out in columns by their distance from the outputs, for whoever opens the editor."""
         nodes = list(self.tree.nodes)
         number = {node.as_pointer(): i for i, node in enumerate(nodes)}
-        # Nodes and links are asked once: each question takes as long as hundreds of comparisons.
-        links = [(number[link.from_node.as_pointer()], number[link.to_node.as_pointer()]) for link in self.tree.links]
+        fed: dict[int, set[int]] = {here: set() for here in number.values()}
+        for link in self.tree.links:
+            fed[number[link.from_node.as_pointer()]].add(number[link.to_node.as_pointer()])
         column = [0] * len(nodes)
-        for _ in nodes:
-            moved = False
-            for here, there in links:
-                if column[here] <= column[there]:
-                    column[here], moved = column[there] + 1, True
-            if not moved:
-                break
+        for here in TopologicalSorter(fed).static_order():  # what it feeds comes first
+            column[here] = max((column[there] + 1 for there in fed[here]), default=0)
         rows: dict[int, int] = {}
         places = []
         for place in column:
@@ -336,8 +327,14 @@ def node_group(
     """
 
     def fill(tree: bpy.types.NodeTree) -> None:
-        for socket in inputs:
-            _add_input(tree, *socket)
+        for label, kind, *more in inputs:
+            default, limits, description = (*more, *(None, None, "")[len(more) :])
+            about = {"name": label, "description": description, "socket_type": f"NodeSocket{kind}"}
+            made = tree.interface.new_socket(in_out='INPUT', **about)
+            if limits is not None:
+                made.min_value, made.max_value = limits
+            if default is not None:
+                made.default_value = default
         for output, kind in outputs:
             tree.interface.new_socket(name=output, in_out='OUTPUT', socket_type=f"NodeSocket{kind}")
         graph = Graph(tree)
@@ -347,23 +344,6 @@ def node_group(
 
     groups = bpy.data.node_groups
     return get_or_create(groups, name, version, lambda name: groups.new(name, f"{kind}NodeTree"), fill)
-
-
-def _add_input(
-    tree: bpy.types.NodeTree,
-    name: str,
-    kind: str,
-    default: Any = None,
-    limits: tuple[float, float] | None = None,
-    description: str = "",
-) -> None:
-    made = tree.interface.new_socket(
-        name=name, description=description, in_out='INPUT', socket_type=f"NodeSocket{kind}"
-    )
-    if limits is not None:
-        made.min_value, made.max_value = limits
-    if default is not None:
-        made.default_value = default
 
 
 def surface_material(name: str, version: int, build: Callable[[Graph, bpy.types.Material], None]) -> bpy.types.Material:

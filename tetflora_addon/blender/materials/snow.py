@@ -45,18 +45,10 @@ _CLOUDS = (microsphere.SHELL_MATERIAL, microsphere.BAKED_SHELL_MATERIAL)
 
 
 def has_snow(scene: bpy.types.Scene) -> bool:
-    """Whether there is snow in a scene, or may be in one of its frames."""
-    year = scene.tetflora.year
-    if not year.enabled:
-        return False
-    return year.snow > 0.0 or _is_keyed(scene)
-
-
-def _is_keyed(scene: bpy.types.Scene) -> bool:
-    """Whether the amount of snow has keys or a driver."""
-    animation = scene.animation_data
-    if animation is None:
-        return False
+    """Whether there is snow in a scene, or may be in one of its frames, by keys or a driver of its amount."""
+    year, animation = scene.tetflora.year, scene.animation_data
+    if not year.enabled or year.snow > 0.0 or animation is None:
+        return year.enabled and year.snow > 0.0
     layers = animation.action.layers if animation.action is not None else ()
     bags = [bag for layer in layers for strip in layer.strips for bag in strip.channelbags]
     curves = [*animation.drivers, *(curve for bag in bags for curve in bag.fcurves)]
@@ -76,11 +68,6 @@ def fit(materials: Iterable[bpy.types.Material | None]) -> None:
             add_snow(material, mark=True)
         else:
             _clear(material.node_tree)
-
-
-def fit_soils() -> None:
-    """`fit` for the materials that Ground Cover made."""
-    fit(material for material in bpy.data.materials if is_soil(material))
 
 
 def add_snow(material: bpy.types.Material, mark: bool = False) -> bool:

@@ -69,7 +69,7 @@ def soil_material(
     size: Floats,
     material: bpy.types.Material | None = None,
 ) -> bpy.types.Material:
-    """A material for the ground, or the given one with another map.
+    """A material for the ground, or the soil of before with another map; what the artist changed in its nodes stays.
 
     Parameters
     ----------
@@ -81,8 +81,6 @@ def soil_material(
         Their mean linear RGB.
     low, size : (2,) float64
         Corner and extent of the map, meters in world space.
-    material : bpy.types.Material, optional
-        Soil of before. What the artist changed in its nodes stays.
     """
     image = _image(name, colors, green)
     nodes = None if material is None else shader_tree(material).nodes

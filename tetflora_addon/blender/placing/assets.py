@@ -17,7 +17,7 @@ from ...errors import SceneError
 from ...files import read_whole, write_whole
 from ...species.catalog import FileInfo, list_species, load_species
 from ..preferences import species_folders
-from ..runtime import Handlers
+from ..runtime import handlers
 from ..saved_files import VERSION, write_blend
 from ..species.catalog import thumbnail_file
 from .plant_objects import prepare_scene
@@ -124,5 +124,4 @@ def _on_import(context: bpy.types.BlendImportContext, _other: object = None) -> 
         prepare_scene(bpy.context.scene)
 
 
-_HANDLERS = Handlers(blend_import_post=_on_import)
-register, unregister = _HANDLERS.register, _HANDLERS.unregister
+register, unregister = handlers(blend_import_post=_on_import)

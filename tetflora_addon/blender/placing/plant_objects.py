@@ -8,7 +8,6 @@ from nodes, or that has edges and faces, belongs to somebody else's modeling and
 
 import uuid
 from collections.abc import Generator, Iterable, Sequence
-from functools import lru_cache
 
 import bpy
 import numpy as np
@@ -198,17 +197,7 @@ def add_field(
     collection: bpy.types.Collection | None = None,
     ages: np.ndarray | None = None,
 ) -> bpy.types.Object:
-    """Make one field of the plants of a placement.
-
-    Parameters
-    ----------
-    species : sequence of str
-        Identifiers that ``placement.species`` refers to.
-    collection : bpy.types.Collection, optional
-        Where it goes; the scene's collection for plants if not given.
-    ages : (n,) float, optional
-        Years; all are full-grown if not given.
-    """
+    """Make one field of the plants of a placement; parameters are those of `add_plants_steps`."""
     rows = (placement.position, placement.rotation, placement.scale, placement.species, placement.seed)
     return link_field(scene, fields.write_field(FIELD, *rows, species, ages=ages), collection)
 
@@ -280,12 +269,9 @@ def plants_from_field(
 
 
 def remove_fields(objects: Iterable[bpy.types.Object], tidy: bool = True) -> int:
-    """Delete fields that TetFlora made; others keep their object and lose the mark. How many plants they stored.
+    """Delete fields that TetFlora made, and if ``tidy`` collections that this leaves empty; how many plants went.
 
-    Parameters
-    ----------
-    tidy : bool
-        Remove collections that this leaves empty.
+    Others keep their object and lose the mark.
     """
     gone = [o for o in fields.fields_of(objects) if o.library is None]
     number = sum(fields.stored_size(field) for field in gone)
@@ -342,18 +328,13 @@ def show_age(plant: bpy.types.Object) -> None:
 
 def assign_species(objects: Iterable[bpy.types.Object], identifier: str) -> int:
     """Make plants belong to a species; how many were changed. Their seeds stay."""
-
-    @lru_cache(maxsize=1)
-    def height() -> float:
-        return display_height(identifier)
-
-    changed = [o for o in plants_of(objects) if o.tetflora.species != identifier]
+    changed, height = [o for o in plants_of(objects) if o.tetflora.species != identifier], display_height(identifier)
     for obj in changed:
         obj.tetflora.species = identifier
         if obj.tetflora.age > 0.0:
             show_age(obj)
         elif obj.type == 'EMPTY':
-            obj.empty_display_size = height()
+            obj.empty_display_size = height
     return len(changed)
 
 
@@ -443,7 +424,12 @@ def add_points(
     species : sequence of str
         Identifiers; those that the field's list lacks are added to it.
     """
-    numbers = np.array([_kind_number(obj, identifier) for identifier in species], np.int32)
+    kinds_there = list(fields.field_kinds(obj)) if obj.tetflora.field_species else []
+    for identifier in species:
+        if identifier not in kinds_there:
+            obj.tetflora.field_species.add().species = identifier
+            kinds_there.append(identifier)
+    numbers = np.array([kinds_there.index(identifier) for identifier in species], np.int32)
     world = np.array(obj.matrix_world, dtype=np.float64)
     size = float(np.cbrt(abs(np.linalg.det(world[:3, :3]))))
     turn = np.array(obj.matrix_world.to_3x3().normalized(), dtype=np.float64)
@@ -510,14 +496,6 @@ def _join_equal_kinds(obj: bpy.types.Object) -> None:
         if kinds.index(kinds[index]) != index:
             entries.remove(index)
     obj.data.update()
-
-
-def _kind_number(obj: bpy.types.Object, identifier: str) -> int:
-    kinds = fields.field_kinds(obj) if obj.tetflora.field_species else ()
-    if identifier in kinds:
-        return kinds.index(identifier)
-    obj.tetflora.field_species.add().species = identifier
-    return len(obj.tetflora.field_species) - 1
 
 
 def _points(mesh: bpy.types.Mesh) -> Points:

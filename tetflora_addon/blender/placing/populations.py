@@ -127,7 +127,9 @@ def make_plants_steps(data: JobData, population: TetFloraLayer) -> Job[PlacedPla
     returned = max(population.made - own_number(own), 0)
     field = makes_field(population, len(placement)) and len(placement)
     made: list[bpy.types.Object] = []
-    ages = own_ages(population, placement)
+    ages = None
+    if population.age > 0.0:
+        ages = np.minimum(plant_ages(placement.seed, population.age, population.age_spread), np.float32(MOST_YEARS))
     if not own and not field:  # otherwise they go first, or their successors could not have their names
         made = yield from _new_plants(scene, placement, search.species, collection_of(scene, population), ages)
     _release(copies)
@@ -156,13 +158,6 @@ def still_there(data: JobData, uid: str) -> TetFloraLayer:
         data.stop("its population was deleted")
         data.check()
     return found
-
-
-def own_ages(population: TetFloraLayer, placement: Placement) -> Floats32 | None:
-    """Ages (n,) of a population's plants in years; None where all are full-grown."""
-    if population.age == 0.0:
-        return None
-    return np.minimum(plant_ages(placement.seed, population.age, population.age_spread), np.float32(MOST_YEARS))
 
 
 def _new_plants(
@@ -247,13 +242,7 @@ def restored(scene: bpy.types.Scene) -> Iterator[None]:
 
 
 def refuse_frozen(population: TetFloraLayer) -> None:
-    """Keep the plants of a frozen population from being replaced.
-
-    Raises
-    ------
-    SceneError
-        It is frozen.
-    """
+    """Refuse to replace the plants of a frozen population with a `SceneError`."""
     if population.frozen:
         raise SceneError(f'"{population.name}" is frozen and keeps its plants; turn off Freeze to change it')
 

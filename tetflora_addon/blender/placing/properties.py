@@ -177,20 +177,6 @@ def _set_limits(owner: bpy.types.PropertyGroup, bits: int) -> None:
     listeners.notify()
 
 
-class Limited:
-    """Mix-in: which limits of where something grows panels show."""
-
-    limits: choice(
-        "Limits",
-        "What limits where this grows; switched off, it no longer does",
-        _limit_items,
-        options={'ENUM_FLAG', 'SKIP_SAVE'},
-        get=limits_in_use,
-        set=_set_limits,
-    )
-    limits_shown: integer("Limits That Are Shown", **HIDDEN)
-
-
 class GroundMask:
     """Mix-in: where on its grounds something grows, by a vertex group and an image, and whether altitudes count."""
 
@@ -205,9 +191,18 @@ class GroundMask:
     uv_layer: string("UV Map", "UV map of the ground for the image; the active one if empty", **LIVE)
 
 
-class AroundPaths(Limited):
-    """Mix-in: inside which areas something grows, and how far from which paths."""
+class AroundPaths:
+    """Mix-in: which limits of where something grows panels show; inside which areas, and how far from which paths."""
 
+    limits: choice(
+        "Limits",
+        "What limits where this grows; switched off, it no longer does",
+        _limit_items,
+        options={'ENUM_FLAG', 'SKIP_SAVE'},
+        get=limits_in_use,
+        set=_set_limits,
+    )
+    limits_shown: integer("Limits That Are Shown", **HIDDEN)
     areas: pointer_to(
         bpy.types.Collection,
         "Areas",

@@ -14,6 +14,7 @@ from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from functools import lru_cache
 from hashlib import blake2b
+from itertools import takewhile
 from math import inf
 from typing import Any
 
@@ -77,15 +78,11 @@ def come_before(scene: bpy.types.Scene, biome: bpy.types.PropertyGroup) -> list[
     """
     if not biome.gives_way:
         return []
-    own, found = {entry.object for entry in biome.grounds}, []
-    limited = is_limited(biome)
-    for other in biomes_in(scene):
-        if other.uid == biome.uid:
-            if limited:
-                break
-        elif is_limited(other) and own & {entry.object for entry in other.grounds}:
-            found.append(other)
-    return found
+    own, others = {entry.object for entry in biome.grounds}, biomes_in(scene)
+    if is_limited(biome):
+        others = takewhile(lambda other: other.uid != biome.uid, others)
+    limited = (other for other in others if other.uid != biome.uid and is_limited(other))
+    return [other for other in limited if own & {entry.object for entry in other.grounds}]
 
 
 def zone_values(scene: bpy.types.Scene, population: bpy.types.PropertyGroup) -> list[Any]:
@@ -202,16 +199,11 @@ def _defaults(kind: type[bpy.types.PropertyGroup]) -> tuple[tuple[str, Any], ...
     return tuple((p.identifier, None if p.type == 'POINTER' else p.default) for p in simple)
 
 
-def is_outdated(population: bpy.types.PropertyGroup) -> bool:
-    """Whether an update would place by other settings than those by which the plants stand; grounds are not read."""
-    return bool(population.placed_by) and not population.frozen and population.placed_by != fingerprint(population)
-
-
 def awaits_update(population: bpy.types.PropertyGroup) -> bool:
-    """Whether a population has no plants yet, or others than an update would give it."""
+    """Whether a population has no plants yet, or others than an update would give it; grounds are not read."""
     if not population.uid or population.frozen:
         return False
-    return not population.made or not population.placed_by or is_outdated(population)
+    return not population.made or population.placed_by != fingerprint(population)
 
 
 def free_seed(scene: bpy.types.Scene, seed: int) -> int:

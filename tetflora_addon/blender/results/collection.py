@@ -3,7 +3,8 @@
 """Result collections: what refinement adds to a scene, replaces and clears, and nothing else."""
 
 from collections.abc import Callable, Generator, Hashable, Mapping, Sequence
-from typing import Any, TypeVar
+from dataclasses import dataclass, field
+from typing import Any, Self, TypeVar
 
 import bpy
 
@@ -13,6 +14,7 @@ from ...species.species import Species
 from ..declare import FIXED, boolean, integer, list_of, pointer_to, string
 from ..materials import snow
 from ..materials.nodes import is_own, tag
+from ..materials.soil import is_soil
 from ..runtime import JobData, is_there
 from ..scene.looks import LIKE
 from ..settings import switches
@@ -29,37 +31,31 @@ NAMES = {'VIEW': "TetFlora", 'RENDER': "TetFlora render"}
 _Made = TypeVar("_Made", bound=bpy.types.ID)
 
 
+@dataclass(eq=False)
 class Results:
     """A result collection under construction, which is in no scene until it is finished.
 
     So nobody sees anything twice. A first look is finished, and what is made after it takes its place tile by tile.
     `discard` removes all that has no place yet.
-
-    Parameters
-    ----------
-    purpose : {'VIEW', 'RENDER'}
-    mark : str
-        Suffix of all names, where there are results of several cameras at the same time.
-    data : JobData, optional
-        Of the job, which ends when somebody deletes its results.
     """
 
-    def __init__(self, scene: bpy.types.Scene, purpose: str, mark: str = "", data: JobData | None = None) -> None:
-        self.scene = scene
-        self.data = data
-        self.purpose = purpose
-        self.first: Results | None = None  # the first look
-        self.by_tile = True  # whether that has the same tiles
-        self.tile: int | None = None  # of what is made now; what has none takes its place when all is made
-        #: Objects by their tiles, as long as they are not yet replaced
-        self.tiles: dict[int | None, list[bpy.types.Object]] = {}
-        #: (3,): Where in the world positions in buffers are counted from, meters: objects are placed there
-        self.origin: Sequence[float] = (0.0, 0.0, 0.0)
-        #: Looks of objects that show instances, where more than they themselves say counts
-        self.owners: Mapping[bpy.types.Object | None, str] = {}
-        self.looks: Sequence[str] = ()  # of plants of each kind, see `scene.looks`; empty where there are none
-        self.mark = f" {mark}" if mark else ""
-        self.collection: bpy.types.Collection | None = None
+    scene: bpy.types.Scene
+    purpose: str  # {'VIEW', 'RENDER'}
+    mark: str = ""  # suffix of all names, where there are results of several cameras at the same time
+    data: JobData | None = None  # of the job, which ends when somebody deletes its results
+    first: Self | None = None  # the first look
+    by_tile: bool = True  # whether that has the same tiles
+    tile: int | None = None  # of what is made now; what has none takes its place when all is made
+    #: Objects by their tiles, as long as they are not yet replaced
+    tiles: dict[int | None, list[bpy.types.Object]] = field(default_factory=dict)
+    #: (3,): Where in the world positions in buffers are counted from, meters: objects are placed there
+    origin: Sequence[float] = (0.0, 0.0, 0.0)
+    #: Looks of objects that show instances, where more than they themselves say counts
+    owners: Mapping[bpy.types.Object | None, str] = field(default_factory=dict)
+    looks: Sequence[str] = ()  # of plants of each kind, see `scene.looks`; empty where there are none
+    collection: bpy.types.Collection | None = None
+
+    def __post_init__(self) -> None:
         self._made: list[bpy.types.ID] = []
         self._names: list[tuple[bpy.types.ID, str]] = []
         self._held: list[bpy.types.ID] = []
@@ -69,8 +65,9 @@ class Results:
     def open(self) -> None:
         """Make the collection."""
         earlier = result_collections(self.scene, 'VIEW') if self.purpose == 'VIEW' else []
-        name = earlier[0].name if earlier else NAMES[self.purpose] + self.mark  # the artist may have renamed it
-        snow.fit_soils()
+        # The artist may have renamed it.
+        name = earlier[0].name if earlier else f"{NAMES[self.purpose]} {self.mark}".strip()
+        snow.fit(filter(is_soil, bpy.data.materials))
         self.collection = bpy.data.collections.new(name)
         self._names += [(self.collection, name)] if self.first is None else []
         self.collection[output.PURPOSE] = self.purpose
@@ -126,7 +123,7 @@ class Results:
         if not self.mark:
             return name
         stem, _, number = name.rpartition(" ")
-        end = f" {number}{self.mark}"
+        end = f" {number} {self.mark}"
         return stem.encode()[: _LONGEST - len(end)].decode(errors="ignore") + end
 
     def look_of(self, number: int | None) -> str:

@@ -47,16 +47,19 @@ def is_switched(obj: bpy.types.Object) -> bool:
     return any(curve.data_path in _FLAGS for curve in curves)
 
 
-def check_linked(scene: bpy.types.Scene, originals: Sequence[bpy.types.Object]) -> None:
-    """See whether `hide_linked` can hide objects.
+def hide_linked(scene: bpy.types.Scene, purpose: str, originals: Sequence[bpy.types.Object]) -> None:
+    """Hide linked objects too.
 
     Raises
     ------
     SceneError
-        It cannot hide one; the message names it and says what to do.
+        It cannot hide one: names it and says what to do. Nothing is hidden then.
     """
-    known = {o for purpose in HIDDEN_LINKED for other in bpy.data.scenes for o in linked_hidden(other, purpose)}
-    homes = _collections(scene)
+    hidden, homes = linked_hidden(scene, purpose), _collections(scene)
+    wanted = list(dict.fromkeys([*hidden, *originals]))
+    if len(wanted) == len(hidden):
+        return
+    known = {o for which in HIDDEN_LINKED for other in bpy.data.scenes for o in linked_hidden(other, which)}
     for obj in originals:
         if obj.library is None or obj in known:
             continue
@@ -66,21 +69,6 @@ def check_linked(scene: bpy.types.Scene, originals: Sequence[bpy.types.Object]) 
                 "while results replace it; refine the object that instances its collection instead, or choose Object > "
                 "Library Override > Make"
             )
-
-
-def hide_linked(scene: bpy.types.Scene, purpose: str, originals: Sequence[bpy.types.Object]) -> None:
-    """Hide linked objects too.
-
-    Raises
-    ------
-    SceneError
-        As `check_linked`, before anything is hidden.
-    """
-    hidden = linked_hidden(scene, purpose)
-    wanted = list(dict.fromkeys([*hidden, *originals]))
-    if len(wanted) == len(hidden):
-        return
-    check_linked(scene, originals)
     show_linked(scene, purpose)
     taken, excluded = [], set()
     for obj in wanted:
@@ -189,10 +177,7 @@ OVERRIDES = "tetflora_hidden_overrides"
 def hide_originals(scene: bpy.types.Scene, purpose: str, originals: Sequence[bpy.types.Object]) -> None:
     """Hide objects that results replace, in viewports too unless the results are only for a render.
 
-    Raises
-    ------
-    SceneError
-        One is linked in such a way that it cannot be hidden: see `check_linked`. None is hidden then.
+    Errors are those of `hide_linked`; nothing is hidden then.
     """
     apart = [original for original in originals if original.library is not None or is_switched(original)]
     hide_linked(scene, purpose, apart)

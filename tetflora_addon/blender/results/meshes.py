@@ -111,7 +111,7 @@ def _fill(mesh: bpy.types.Mesh, buffers: MeshBuffers) -> Iterator[None]:
 
 
 def check_buffers(buffers: MeshBuffers) -> None:
-    """Raise ValueError unless shapes, dtypes, indices, faces and attributes of buffers are valid in Blender."""
+    """Raise ValueError where shapes, dtypes, indices, faces or attributes are not valid; Blender would crash."""
     corners, faces, vertices = len(buffers.corner_verts), buffers.polygons, len(buffers.positions)
     for key, shape, dtype in (
         ("positions", (vertices, 3), np.float32),
@@ -178,23 +178,17 @@ def point_object(name: str, buffers: PointBuffers, material: bpy.types.Material)
     if by_nodes:
         data = write_mesh(name, vertices, [material])
     else:
-        data = _write_cloud(name, vertices)
+        check_buffers(vertices)
+        data = bpy.data.pointclouds.new(name)
+        data.resize(len(buffers.positions))
+        for key, array in {"position": buffers.positions, **values}.items():
+            write(data, key, array)
+        data.update_tag()
         data.materials.append(material)
     made = bpy.data.objects.new(name, data)
     if by_nodes:
         made.modifiers.new("Spheres", 'NODES').node_group = spheres_group(material)
     return made
-
-
-def _write_cloud(name: str, vertices: MeshBuffers) -> bpy.types.PointCloud:
-    check_buffers(vertices)
-    cloud = bpy.data.pointclouds.new(name)
-    cloud.resize(len(vertices.positions))
-    write(cloud, "position", vertices.positions)
-    for key, (_, values) in vertices.attributes.items():
-        write(cloud, key, values)
-    cloud.update_tag()
-    return cloud
 
 
 def spheres_group(material: bpy.types.Material) -> bpy.types.NodeTree:

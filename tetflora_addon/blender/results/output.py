@@ -7,6 +7,7 @@ layer. Results of a render and the artist's results share it, so that its name, 
 """
 
 from collections.abc import Iterable
+from itertools import chain
 from typing import Any
 
 import bpy
@@ -78,11 +79,9 @@ def dress(scene: bpy.types.Scene, made: bpy.types.Object, identifier: str) -> No
 def parent_of(collection: bpy.types.Collection, identifier: str, name: str) -> bpy.types.Object:
     """The parent of a species' results, in a result collection; one for all of the file."""
     # Search all objects of the file only once for a collection: there may be hundreds of thousands.
-    for objects in (collection.objects, bpy.data.objects):
-        found = next((o for o in objects if o.get(KIND) == PARENT and o.get(SPECIES) == identifier and is_own(o)), None)
-        if found is not None:
-            break
-    else:
+    every = chain(collection.objects, bpy.data.objects)
+    found = next((o for o in every if o.get(KIND) == PARENT and o.get(SPECIES) == identifier and is_own(o)), None)
+    if found is None:
         found = bpy.data.objects.new(f"{name} (TetFlora)", None)
         found.empty_display_size = 0.0
         found.hide_select = True

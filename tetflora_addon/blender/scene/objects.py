@@ -17,7 +17,7 @@ from zlib import crc32
 import bpy
 import numpy as np
 
-from ...arrays import Floats, Floats32, Integers, Integers32, Keys
+from ...arrays import Floats, Floats32, Integers, Keys
 from ...errors import SceneError
 from ...growth.hashing import child_key, key_of_seed
 from ..attributes import members, mesh_of, read, values_of, world_matrix
@@ -103,29 +103,20 @@ def references_of(geometry: bpy.types.GeometrySet) -> Iterator[tuple[Reference, 
     points = geometry.instances_pointcloud()
     if points is None or not len(points.points):
         return
-    references = geometry.instance_references()
-    reference, transform, number = _read_instances(points)
+    references, own = geometry.instance_references(), points.attributes.get("id")
+    transform = read(points, "instance_transform").reshape(-1, 4, 4)
+    known = own is not None and own.data_type == 'INT'
+    number = values_of(own).astype(np.int64) if known else np.arange(len(transform))
     if len(references) == 1:
         if references[0] is not None:  # somebody has deleted it
             yield references[0], Rows(transform, number)
         return
+    reference = read(points, ".reference_index")
     order = np.argsort(reference, kind="stable")
     bounds = np.searchsorted(reference[order], np.arange(len(references) + 1))
     for target, (start, end) in zip(references, pairwise(bounds), strict=True):
         if target is not None and start < end:
             yield target, Rows(transform[order[start:end]], number[order[start:end]])
-
-
-def _read_instances(points: bpy.types.PointCloud) -> tuple[Integers32, Floats32, Integers]:
-    """Reference, columns of the transform (n, 4, 4) and identifier of each instance."""
-    transform = read(points, "instance_transform").reshape(-1, 4, 4)
-    own = points.attributes.get("id")
-    known = own is not None and own.data_type == 'INT'
-    return (
-        read(points, ".reference_index"),
-        transform,
-        values_of(own).astype(np.int64) if known else np.arange(len(transform)),
-    )
 
 
 def name_keys(objects: Sequence[bpy.types.Object]) -> Keys:
@@ -298,11 +289,9 @@ def copies_of(objects: Sequence[bpy.types.Object], depsgraph: bpy.types.Depsgrap
         elif has_nodes(obj):
             alone[obj, ""] = [obj]
     for (shown, _), instancers in (alone | groups).items():
-        walk = _Walk(depsgraph, instancers[0])
         matrices = np.array([world_matrix(obj, depsgraph) for obj in instancers], dtype=np.float64)
         try:
-            walk.within(shown, matrices, name_keys(instancers))
-            found += walk.found
+            found += list(_within(shown, matrices, name_keys(instancers), depsgraph, instancers[0]))
         except _OneByOne:
             left.update(instancers)
     return found + (list(_one_by_one(left, depsgraph)) if left else [])
@@ -350,7 +339,11 @@ def instanced_by(
     if isinstance(shown, bpy.types.Collection):
         back = np.eye(4)
         back[:3, 3] = -np.array(shown.instance_offset)
-        for n, obj in enumerate(sorted(rendered_objects(shown), key=lambda o: o.name_full)):
+        homes = [] if shown.hide_render else [shown]
+        for home in homes:  # which get more
+            homes += [child for child in home.children if not child.hide_render]
+        objects = {obj for home in homes for obj in home.objects if not obj.hide_render}
+        for n, obj in enumerate(sorted(objects, key=lambda o: o.name_full)):
             yield obj, matrices @ (back @ world_matrix(obj, depsgraph)), child_key(keys, n)
         return
     if isinstance(shown, bpy.types.Object):
@@ -362,43 +355,29 @@ def instanced_by(
         yield original, *rows.within(matrices, keys)
 
 
-def rendered_objects(collection: bpy.types.Collection) -> Iterator[bpy.types.Object]:
-    """Objects of a collection, and of those in it, that are not hidden in renders."""
-    waiting, seen = [collection], set()
-    while waiting:
-        inner = waiting.pop()
-        if inner.hide_render:
-            continue
-        waiting += list(inner.children)
-        for obj in inner.objects:
-            if not obj.hide_render and (pointer := obj.as_pointer()) not in seen:
-                seen.add(pointer)
-                yield obj
-
-
-class _Walk:
-    """Follows references down to plants and fields, with all places at once."""
-
-    def __init__(self, depsgraph: bpy.types.Depsgraph, instancer: bpy.types.Object) -> None:
-        self._depsgraph, self._instancer = depsgraph, instancer
-        self.found: list[Copies] = []
-
-    def within(
-        self, shown: Reference, matrices: Floats, keys: Keys, owner: bpy.types.Object | None = None, depth: int = 0
-    ) -> None:
-        """Take what something instances; of geometry, the object whose nodes made it is the owner."""
-        owner = shown if isinstance(shown, bpy.types.Object) else owner
-        for one, places, names in instanced_by(shown, matrices, keys, self._depsgraph):
-            if not isinstance(one, bpy.types.Object):
-                if isinstance(one, bpy.types.GeometrySet) and owner.tetflora.is_field:
-                    self.found.append(Copies(owner, one, places, names, self._instancer))
-                self.within(one, places, names, owner, depth)
-            elif (may_take_part(one) or len(one.particle_systems)) and not one.hide_render and depth < DEEPEST:
-                if one.tetflora.is_plant or one.tetflora.is_field:
-                    self.found.append(Copies(one, None, places, names, self._instancer))
-                if is_listed(one):
-                    raise _OneByOne
-                self.within(one, places, names, None, depth + 1)
+def _within(
+    shown: Reference,
+    matrices: Floats,
+    keys: Keys,
+    depsgraph: bpy.types.Depsgraph,
+    instancer: bpy.types.Object,
+    owner: bpy.types.Object | None = None,
+    depth: int = 0,
+) -> Iterator[Copies]:
+    """Plants and fields in what something instances; of geometry, the object whose nodes made it is the owner."""
+    owner = shown if isinstance(shown, bpy.types.Object) else owner
+    for one, places, names in instanced_by(shown, matrices, keys, depsgraph):
+        given = one, places, names, depsgraph, instancer
+        if not isinstance(one, bpy.types.Object):
+            if isinstance(one, bpy.types.GeometrySet) and owner.tetflora.is_field:
+                yield Copies(owner, one, places, names, instancer)
+            yield from _within(*given, owner, depth)
+        elif (may_take_part(one) or len(one.particle_systems)) and not one.hide_render and depth < DEEPEST:
+            if one.tetflora.is_plant or one.tetflora.is_field:
+                yield Copies(one, None, places, names, instancer)
+            if is_listed(one):
+                raise _OneByOne
+            yield from _within(*given, None, depth + 1)
 
 
 def _one_by_one(instancers: set[bpy.types.Object], depsgraph: bpy.types.Depsgraph) -> Iterator[Copies]:

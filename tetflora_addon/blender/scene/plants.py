@@ -106,7 +106,13 @@ class Source:
 
     def without(self, species: Container[str]) -> Self:
         """The same without plants of some species."""
-        return replace(self, part=_grown(self.part, species))
+        name, seeds, ages, sizes = self.part
+        kept = np.array([species_of(kind) not in species for kind in seeds.identifiers], bool)
+        if kept.all():
+            return self
+        own = np.flatnonzero(kept[seeds.species])
+        left = seeds.take(own), None if ages is None else ages[own], None if sizes is None else sizes.take(own)
+        return replace(self, part=(name, *left))
 
 
 @dataclass
@@ -205,19 +211,8 @@ def _find_plants(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> _Fou
     sources = [some for source in given if len((some := source.without(assets)).part[1])]
     for source in sources:
         name, seeds, *_ = source.part
-        kinds = [seeds.identifiers[i] for i in np.flatnonzero(np.bincount(seeds.species)).tolist()]
-        odd += [(name, own) for own in dict.fromkeys(map(species_of, kinds)) if own not in known]
+        odd += [(name, own) for own in dict.fromkeys(map(species_of, _occurring(seeds))) if own not in known]
     return _Found(sources, alike, odd, own, copies)
-
-
-def _grown(part: Part, assets: Container[str]) -> Part:
-    """Plants without those whose species is an asset, or not there."""
-    name, seeds, ages, sizes = part
-    grows = np.array([species_of(kind) not in assets for kind in seeds.identifiers], bool)
-    if grows.all():
-        return part
-    own = np.flatnonzero(grows[seeds.species])
-    return name, seeds.take(own), None if ages is None else ages[own], None if sizes is None else sizes.take(own)
 
 
 @dataclass(frozen=True)
@@ -289,8 +284,10 @@ def read_asset_plants(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) ->
 def single_plants(plants: list[bpy.types.Object], depsgraph: bpy.types.Depsgraph) -> Seeds:
     """Plants that are objects, in their order. Errors are those of `read_plants`."""
     groups = [obj.tetflora for obj in plants]
-    names, own = [obj.name for obj in plants], [kind_of_choice(group) for group in groups]
-    _check_species(list(zip(names, own, strict=True)))
+    names, own, known = [obj.name for obj in plants], [kind_of_choice(group) for group in groups], catalog()
+    odd = [(name, group.species) for name, group in zip(names, groups, strict=True) if group.species not in known]
+    if odd:
+        raise SceneError(_unknown(odd))
     number = {kind: i for i, kind in enumerate(sorted(set(own)))}
     species = np.array([number[kind] for kind in own], dtype=np.int32)
     seeds = np.array([group.seed for group in groups], dtype=np.int64)
@@ -320,30 +317,21 @@ def _placed(names: list[str], kinds: tuple[str, ...], species: Integers32, seeds
     return Seeds(kinds, species, seeds, matrices[:, :3, 3].copy(), frame, scale)
 
 
+def _occurring(seeds: Seeds) -> list[str]:
+    return [seeds.identifiers[i] for i in np.flatnonzero(np.bincount(seeds.species)).tolist()]
+
+
 def merged(read: list[Seeds]) -> Seeds:
     """Plants of all objects as one, with the kinds that occur."""
-    tables = []
-    for seeds in read:
-        occurring = np.bincount(seeds.species, minlength=len(seeds.identifiers)) > 0
-        tables.append({i: seeds.identifiers[i] for i in np.flatnonzero(occurring).tolist()})
-    identifiers = tuple(sorted({kind for table in tables for kind in table.values()}))
+    identifiers = tuple(sorted({kind for seeds in read for kind in _occurring(seeds)}))
     number = {kind: i for i, kind in enumerate(identifiers)}
     parts, shaped = [], any(seeds.crown is not None for seeds in read)
-    for seeds, table in zip(read, tables, strict=True):
-        to_all = np.zeros(len(seeds.identifiers), np.int32)
-        to_all[list(table)] = [number[kind] for kind in table.values()]
+    for seeds in read:
+        to_all = np.array([number.get(kind, 0) for kind in seeds.identifiers], np.int32)
         crown = crown_shapes(len(seeds)) if shaped and seeds.crown is None else seeds.crown
         parts.append(replace(seeds, identifiers=identifiers, species=to_all[seeds.species], crown=crown))
     # Do not copy millions of frames where there is nothing to join.
     return parts[0] if len(parts) == 1 else Seeds.concatenate(parts)
-
-
-def _check_species(plants: list[tuple[str, str]]) -> None:
-    """Refuse kinds, each with the name of an object that has it, whose species nobody has."""
-    known = catalog()
-    bad = [(name, species) for name, kind in plants if (species := species_of(kind)) not in known]
-    if bad:
-        raise SceneError(_unknown(bad))
 
 
 def _unknown(odd: list[tuple[str, str]]) -> str:

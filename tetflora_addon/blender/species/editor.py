@@ -6,7 +6,6 @@ The properties store nothing. They read the JSON of the chosen species and write
 (`species.edits`), so there is nothing to keep in step with undo, loading or other scenes.
 """
 
-from collections.abc import Callable
 from math import degrees, isfinite, radians
 from typing import Any
 
@@ -229,8 +228,8 @@ def _text(key: str, name: str, description: str) -> Any:
 _THROUGH = "Fraction of the light scattered by a {} that passes through it"
 
 
-class WholeSpecies(SpeciesChoice):
-    """Properties of the editor that do not come from the keys of an order."""
+class TetFloraSpeciesEditor(bpy.types.PropertyGroup, SpeciesChoice):
+    """What the species editor shows; values come from the species' JSON and go there."""
 
     takes_assets = False  # there is nothing to edit in them
 
@@ -318,10 +317,6 @@ def _soft_high(key: Key) -> float:
     return 10.0 * mean if 0.0 < 50.0 * mean < key.high else min(key.high, 360.0)
 
 
-def _common(name: str, key: Key) -> dict[str, Any]:
-    return {"name": _label(name), "description": _description(name, key), "options": set()}
-
-
 def _number_options(key: Key) -> dict[str, Any]:
     """How a number, or both of a range, are typed; those of a range are kept within limits of their own."""
     ranged = key.kind == "range"
@@ -339,7 +334,7 @@ def _number_options(key: Key) -> dict[str, Any]:
     return options
 
 
-def _range(name: str, key: Key) -> dict[str, Any]:
+def _range(name: str, key: Key, said: dict[str, Any]) -> Any:
     """A range is one setting of two numbers, as in the file: mean and variation."""
     to_file, to_slider = (degrees, radians) if key.unit == "degrees" else (float, float)
     limits = ((key.low, key.high), (0.0, key.high - key.low))
@@ -352,90 +347,75 @@ def _range(name: str, key: Key) -> dict[str, Any]:
         typed = zip(map(to_file, pair), limits, strict=True)
         write(editor, name, [rounded(min(max(number, low), high)) for number, (low, high) in typed])
 
-    said = {**_common(name, key), "description": f"{_description(name, key)}. Mean, and {_VARIES.lower()}"}
-    return {name: FloatVectorProperty(size=2, get=read, set=store, **said, **_number_options(key))}
+    said = {**said, "description": f"{said['description']}. Mean, and {_VARIES.lower()}"}
+    return FloatVectorProperty(size=2, get=read, set=store, **said, **_number_options(key))
 
 
-def _single(name: str, key: Key) -> dict[str, Any]:
+def _single(name: str, key: Key, said: dict[str, Any]) -> Any:
     to_file, to_slider = (degrees, radians) if key.unit == "degrees" else (float, float)
-    made = FloatProperty(
+    return FloatProperty(
         get=lambda self: to_slider(number_in(value_of(self, name))),
         set=lambda self, value: write(self, name, rounded(to_file(value))),
-        **_common(name, key),
+        **said,
         **_number_options(key),
     )
-    return {name: made}
 
 
-def _integer(name: str, key: Key) -> dict[str, Any]:
-    made = IntProperty(
+def _integer(name: str, key: Key, said: dict[str, Any]) -> Any:
+    return IntProperty(
         min=int(key.low),
         max=int(key.high),
         get=lambda self: int(min(max(number_in(value_of(self, name)), key.low), key.high)),
         set=lambda self, value: write(self, name, value),
-        **_common(name, key),
+        **said,
     )
-    return {name: made}
 
 
-def _color(name: str, key: Key) -> dict[str, Any]:
+def _tone(name: str, key: Key, said: dict[str, Any], varies: bool = False) -> Any:
     """A color, or that of a mean and its variation."""
-    if key.kind == "rgb":
-        return {name: _tone(name, (), _common(name, key))}
-    varies = {"name": f"{_label(name)} Variation", "description": f"{_VARIES}: {key.meaning}", "options": set()}
-    return {name: _tone(name, (0,), _common(name, key)), name + VARIATION: _tone(name, (1,), varies)}
+    part = () if key.kind == "rgb" else (int(varies),)
 
+    def store(editor: bpy.types.PropertyGroup, value: Any) -> None:
+        new = [rounded(c) for c in value]
+        if part:
+            old = value_of(editor, name)
+            new = [new if i in part else [rounded(number_in(old, i, c)) for c in range(3)] for i in (0, 1)]
+        write(editor, name, new)
 
-def _tone(name: str, part: tuple[int, ...], said: dict[str, Any]) -> Any:
     return FloatVectorProperty(
         subtype='COLOR',
         size=3,
         min=0.0,
         max=1.0,
         get=lambda self: tuple(number_in(value_of(self, name), *part, c) for c in range(3)),
-        set=lambda self, value: _write_color(self, name, part, value),
+        set=store,
         **said,
     )
 
 
-def _write_color(group: bpy.types.PropertyGroup, name: str, part: tuple[int, ...], value: Any) -> None:
-    new = [rounded(c) for c in value]
-    if part:
-        old = value_of(group, name)
-        new = [new if i in part else [rounded(number_in(old, i, c)) for c in range(3)] for i in (0, 1)]
-    write(group, name, new)
-
-
-def _choice(name: str, key: Key) -> dict[str, Any]:
+def _choice(name: str, key: Key, said: dict[str, Any]) -> Any:
     choices = key.choices
-    made = EnumProperty(
+    return EnumProperty(
         items=[(choice, _label(choice), "", number) for number, choice in enumerate(choices)],
         get=lambda self: choices.index(value) if (value := value_of(self, name)) in choices else 0,
         set=lambda self, number: write(self, name, choices[number]),
-        **_common(name, key),
+        **said,
     )
-    return {name: made}
 
 
-_MAKERS: dict[str, Callable[[str, Key], dict[str, Any]]] = {
-    "range": _range,
-    "number": _single,
-    "integer": _integer,
-    "color": _color,
-    "rgb": _color,
-    "choice": _choice,
-}
+_MAKERS = {"range": _range, "number": _single, "integer": _integer, "color": _tone, "rgb": _tone, "choice": _choice}
 
 
-#: ``Scene.tetflora.species_editor``: what the panel shows, and a property for each key of an order.
-TetFloraSpeciesEditor = type(
-    "TetFloraSpeciesEditor",
-    (bpy.types.PropertyGroup, WholeSpecies),
-    {
-        "__annotations__": {
-            name: made for of, key in ORDER_KEYS.items() for name, made in _MAKERS[key.kind](of, key).items()
-        },
-        "__doc__": "What the species editor shows; values come from the species' JSON and go there.",
-        "__module__": __name__,
-    },
-)
+def _sliders() -> dict[str, Any]:
+    """A property for each key of an order, and another for the variation of a color."""
+    made = {}
+    for name, key in ORDER_KEYS.items():
+        said = {"name": _label(name), "description": _description(name, key), "options": set()}
+        made[name] = _MAKERS[key.kind](name, key, said)
+        if key.kind == "color":
+            said |= {"name": f"{said['name']} Variation", "description": f"{_VARIES}: {key.meaning}"}
+            made[name + VARIATION] = _tone(name, key, said, varies=True)
+    return made
+
+
+TetFloraSpeciesEditor.__annotations__ |= _sliders()

@@ -18,6 +18,7 @@ import time
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, suppress
 from functools import lru_cache
+from itertools import chain, count
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -39,7 +40,7 @@ from ...species.catalog import (
 from ...species.species import Species
 from ..declare import string
 from ..preferences import species_folders
-from ..runtime import Handlers, Listeners
+from ..runtime import Listeners, handlers
 from .asset_species import asset_infos, asset_species, copy_asset, find_asset, listed_in, name_of, refuse_asset
 
 #: Custom property of collections: JSON of species by their identifiers, see `pack`.
@@ -135,7 +136,7 @@ def find_edit(scene: bpy.types.Scene | None, identifier: str) -> TetFloraSpecies
 
 def _edits(scene: bpy.types.Scene | None) -> Iterator[TetFloraSpeciesEdit | Page]:
     """Edits of this file, then species of linked plants, then those of others that are nowhere else."""
-    yield from edits_of_scenes(scene)
+    yield from listed_in("species_edits", scene)
     left: list[Page] = []
     for collection in getattr(bpy.data, "collections", ()):
         if PAGES in collection:
@@ -160,11 +161,6 @@ def _pages(text: str) -> tuple[Page, ...]:
         found = {}
     entries = found.items() if isinstance(found, dict) else ()
     return tuple(Page(name, page) for name, page in entries if is_identifier(name) and isinstance(page, str))
-
-
-def edits_of_scenes(scene: bpy.types.Scene | None) -> Iterator[TetFloraSpeciesEdit]:
-    """Edits of this file, those of a scene first."""
-    return listed_in("species_edits", scene)
 
 
 def species_for(scene: bpy.types.Scene | None, identifier: str) -> Species:
@@ -198,21 +194,8 @@ def _species(text: str, identifier: str) -> Species:
 
 def problem_of(scene: bpy.types.Scene | None, identifier: str) -> str:
     """What is wrong with a species, or an empty text; cheap enough for a panel."""
-    edit = find_edit(scene, identifier)
-    if edit is not None:
-        return _problem(edit.text, identifier)
     try:
-        refuse_asset(scene, identifier)
-        load_species(identifier, known=listed())
-    except SpeciesError as error:
-        return str(error)
-    return ""
-
-
-@lru_cache(maxsize=64)
-def _problem(text: str, identifier: str) -> str:
-    try:
-        _species(text, identifier)
+        species_for(scene, identifier)
     except SpeciesError as error:
         return str(error)
     return ""
@@ -273,14 +256,11 @@ def change_species(scene: bpy.types.Scene, identifier: str, change: Callable[[di
 def store_species(scene: bpy.types.Scene, identifier: str, data: dict[str, Any]) -> None:
     """Keep a decoded species in this file under an identifier, in place of an earlier one.
 
-    Raises
-    ------
-    SpeciesError
-        The identifier breaks the rule for them.
+    Errors are those of `checked_identifier`.
     """
     checked_identifier(identifier)
     text = json.dumps(data, ensure_ascii=False)
-    edit = next((edit for edit in edits_of_scenes(scene) if edit.identifier == identifier), None)
+    edit = next((edit for edit in listed_in("species_edits", scene) if edit.identifier == identifier), None)
     if edit is None:
         edit = scene.tetflora.species_edits.add()
         edit.identifier = identifier
@@ -340,11 +320,8 @@ def tell_listeners() -> None:
 def new_identifier(name: str, taken: Callable[[str], bool]) -> str:
     """An identifier for a name, fit for a file's name on every system, that nothing has yet."""
     stem = re.sub(r"[^a-z0-9]+", "_", name.lower()).strip("_")[:50] or "species"
-    number, identifier = 1, stem
-    while taken(identifier) or not is_identifier(identifier):
-        number += 1
-        identifier = f"{stem}_{number}"
-    return identifier
+    names = chain([stem], (f"{stem}_{number}" for number in count(2)))
+    return next(name for name in names if is_identifier(name) and not taken(name))
 
 
 def catalog() -> dict[str, FileInfo]:
@@ -391,7 +368,7 @@ def edited_infos() -> dict[str, FileInfo]:
 def pack(_path: object = None, _other: object = None) -> None:
     """Before a file is written: bring the pages of its collections up to date."""
     own = {name for name, info in listed().items() if info.is_own}
-    own |= {edit.identifier for edit in edits_of_scenes(None)}
+    own |= {edit.identifier for edit in listed_in("species_edits")}
     assets = asset_species()
     for collection in bpy.data.collections:
         if collection.library is not None or not (own or assets or PAGES in collection):
@@ -419,7 +396,7 @@ def _on_import(context: bpy.types.BlendImportContext, _other: object = None) -> 
     for item in context.import_items:
         if isinstance(item.id, bpy.types.Collection) and item.id.library is None:
             for page in pages_of(item.id):
-                if all(page.identifier != edit.identifier for edit in edits_of_scenes(scene)):
+                if all(page.identifier != edit.identifier for edit in listed_in("species_edits", scene)):
                     with suppress(ValueError, SpeciesError):
                         store_species(scene, page.identifier, json.loads(page.text))
             for entry in item.id.tetflora_assets:
@@ -427,6 +404,4 @@ def _on_import(context: bpy.types.BlendImportContext, _other: object = None) -> 
                     entry.object.use_fake_user = True  # nothing else may hold it here
 
 
-_HANDLERS = Handlers(save_pre=pack, blend_import_post=_on_import)
-register: Callable[[], None] = _HANDLERS.register
-unregister: Callable[[], None] = _HANDLERS.unregister
+register, unregister = handlers(save_pre=pack, blend_import_post=_on_import)

@@ -37,7 +37,7 @@ from ..results.collection import has_results
 from ..results.hiding import remove_results
 from ..results.leaf_objects import leaf_objects
 from ..results.output import PURPOSE, remove_collection, result_collections
-from ..runtime import GoneError, Handlers, Part, call_off, call_soon, in_order, listening, redraw, with_uid
+from ..runtime import GoneError, Part, call_off, call_soon, handlers, in_order, listening, redraw, with_uid
 from ..scene.camera import is_rendered, view_camera, viewport_of, viewports
 from ..scene.fields import stand_years
 from ..settings import season_of, wind_of, years_of
@@ -398,7 +398,7 @@ def before_save(*_arguments: object) -> None:
     _state.working = False
 
 
-_HANDLERS = Handlers(
+_HANDLERS = handlers(
     depsgraph_update_post=on_change,
     frame_change_post=on_frame,
     undo_pre=before_undo,

@@ -37,7 +37,7 @@ from ...refinement.loop import refine as refine_loop
 from ...species.kinds import Kind
 from ..job.contents import bind_steps, compile_for, in_year, load_for, memory_left, read_scene, refinement_settings
 from ..main_thread import on_main_thread
-from ..runtime import Handlers, JobData, call_off, call_soon, in_order, job, listening, redraw
+from ..runtime import JobData, call_off, call_soon, handlers, in_order, job, listening, redraw
 from ..scene.ages import crown_kinds, plainly_aged
 from ..scene.camera import read_camera, timeline_moves, views_of
 from ..scene.crowns import crown_for
@@ -299,8 +299,8 @@ def _on_load_post(_path: object, _other: object = None) -> None:
             schedule()
 
 
-_HANDLERS = Handlers(load_pre=_on_load_pre, load_post=_on_load_post)
-_IN_WINDOW = Handlers(
+_HANDLERS = handlers(load_pre=_on_load_pre, load_post=_on_load_post)
+_IN_WINDOW = handlers(
     depsgraph_update_post=_on_update,
     frame_change_post=_on_frame,
     undo_post=state.bring_in_step,

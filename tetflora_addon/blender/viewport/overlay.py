@@ -45,14 +45,21 @@ _handles: list[object] = []
 
 def batch(kind: str, positions: NDArray, colors: NDArray, indices: NDArray) -> gpu.types.GPUBatch:
     """A batch of 'LINES' or 'TRIS' with a color (v, 4) for each corner (v, 3)."""
-    layout = gpu.types.GPUVertFormat()
-    layout.attr_add(id="pos", comp_type='F32', len=3, fetch_mode='FLOAT')
-    layout.attr_add(id="color", comp_type='U8', len=4, fetch_mode='INT_TO_FLOAT_UNIT')
-    corners = gpu.types.GPUVertBuf(layout, len(positions))
-    corners.attr_fill("pos", np.ascontiguousarray(positions, np.float32))
-    corners.attr_fill("color", np.rint(255.0 * colors).astype(np.uint8))
+    corners = _buffer(pos=positions.astype(np.float32), color=np.rint(255.0 * colors).astype(np.uint8))
     elements = gpu.types.GPUIndexBuf(type=kind, seq=np.ascontiguousarray(indices, np.int32))
     return gpu.types.GPUBatch(type=kind, buf=corners, elem=elements)
+
+
+def _buffer(**columns: NDArray) -> gpu.types.GPUVertBuf:
+    """Columns (v, k) of corners or points by their names: float32, or uint8 from 0 to 1."""
+    layout = gpu.types.GPUVertFormat()
+    for name, values in columns.items():
+        kind, mode = ('U8', 'INT_TO_FLOAT_UNIT') if values.dtype == np.uint8 else ('F32', 'FLOAT')
+        layout.attr_add(id=name, comp_type=kind, len=values.shape[1], fetch_mode=mode)
+    made = gpu.types.GPUVertBuf(layout, len(values))
+    for name, values in columns.items():
+        made.attr_fill(name, np.ascontiguousarray(values))
+    return made
 
 
 def chosen_by_worth(level: Level, forms: set[str], most: int) -> NDArray[np.intp]:
@@ -110,25 +117,15 @@ def points(preview: Preview) -> gpu.types.GPUBatch:
     key = (id(crowns.positions),)
     _, standing = _kept(preview, "standing", key, lambda: (crowns.positions, _standing(crowns)))
     shown = np.column_stack([as_shown(crowns.looks[:, :3]), crowns.looks[:, 3]])
-    layout = gpu.types.GPUVertFormat()
-    layout.attr_add(id="look", comp_type='U8', len=4, fetch_mode='INT_TO_FLOAT_UNIT')
-    looks = gpu.types.GPUVertBuf(layout, len(crowns.kinds))
-    looks.attr_fill("look", np.rint(255.0 * np.clip(shown, 0.0, 1.0)).astype(np.uint8)[crowns.kinds])
     made = gpu.types.GPUBatch(type='POINTS', buf=standing)
-    made.vertbuf_add(looks)
+    made.vertbuf_add(_buffer(look=np.rint(255.0 * np.clip(shown, 0.0, 1.0)).astype(np.uint8)[crowns.kinds]))
     return made
 
 
 def _standing(crowns: CrownPoints) -> gpu.types.GPUVertBuf:
-    layout = gpu.types.GPUVertFormat()
-    layout.attr_add(id="pos", comp_type='F32', len=3, fetch_mode='FLOAT')
-    layout.attr_add(id="form", comp_type='F32', len=4, fetch_mode='FLOAT')
-    buffer = gpu.types.GPUVertBuf(layout, len(crowns.kinds))
-    buffer.attr_fill("pos", np.ascontiguousarray(crowns.positions))
     forms = crowns.forms.copy()
     forms[:, :2] *= np.abs(crowns.axes[:, 2:])  # what lies is not high
-    buffer.attr_fill("form", forms)
-    return buffer
+    return _buffer(pos=crowns.positions, form=forms)
 
 
 @cache

@@ -21,7 +21,7 @@ from .. import compat
 from ..placing import properties
 from ..placing.populations import own_objects
 from ..placing.rules import awaits_update, makes_field, read_search, shown_population
-from ..runtime import Handlers, SceneSwitch, in_order, listening, redraw
+from ..runtime import SceneSwitch, handlers, in_order, listening, redraw
 from ..species import edits
 
 Color = tuple[float, float, float, float]
@@ -171,7 +171,7 @@ switch = SceneSwitch(
     drawn=True,
 )
 schedule = switch.schedule
-_HANDLERS = Handlers(
+_HANDLERS = handlers(
     undo_post=lambda *_: schedule(), redo_post=lambda *_: schedule(), load_pre=lambda *_: switch.forget()
 )
 register, unregister = in_order(switch, listening(schedule, properties.listeners, edits.listeners), _HANDLERS)

@@ -19,7 +19,7 @@ from ..job.contents import expected_polygons, in_year
 from ..job.plant_mesh import plant_mesh, plant_parts, single_seed
 from ..materials.nodes import is_ours, tag
 from ..results.leaf_objects import resolved_species
-from ..runtime import Handlers, SceneSwitch, in_order, listening, redraw
+from ..runtime import SceneSwitch, handlers, in_order, listening, redraw
 from ..species import edits
 from ..species.editor import present_species
 
@@ -132,7 +132,7 @@ switch = SceneSwitch(
     _SOON,
     drawn=False,
 )
-_HANDLERS = Handlers(
+_HANDLERS = handlers(
     undo_pre=_before_undo,
     redo_pre=_before_undo,
     undo_post=_on_undo,
