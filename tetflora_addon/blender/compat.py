@@ -5,6 +5,7 @@
 from importlib import import_module
 from math import pi
 from types import SimpleNamespace
+from typing import Any
 
 import bpy
 import gpu
@@ -26,6 +27,11 @@ def eevee_engine() -> str:
 def handlers(name: str) -> list:
     """Functions that Blender calls; of ``exit_pre``, which 4.5 lacks, a list that nobody reads."""
     return getattr(bpy.app.handlers, name, []) if name == "exit_pre" else getattr(bpy.app.handlers, name)
+
+
+def stored_properties(owner: bpy.types.ID) -> Any | None:
+    """Custom properties in which Blender keeps a datablock's groups, whatever add-ons declare now; None without any."""
+    return owner.bl_system_properties_get() if hasattr(owner, "bl_system_properties_get") else owner
 
 
 def shader_tree(owner: bpy.types.Material | bpy.types.World | bpy.types.Light) -> bpy.types.NodeTree:

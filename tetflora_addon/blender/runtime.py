@@ -328,7 +328,12 @@ _running: list[tuple[JobData, Generator]] = []
 def guarded(data: JobData, steps: Generator[Any, Any, _Result]) -> Generator[Any, Any, _Result]:
     """Run a job that must not outlive what it holds; after steps that wait, or are small, little is looked for.
 
-    Closing the steps has to leave everything as it was, whatever is gone. Errors are those of `JobData.check`.
+    Closing the steps has to leave everything as it was, whatever is gone.
+
+    Raises
+    ------
+    GoneError
+        Something is gone, or somebody stopped the job.
     """
     own, sent, waits = (data, steps), None, False
     _running.append(own)

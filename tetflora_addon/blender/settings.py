@@ -189,10 +189,15 @@ def check_limits(group: bpy.types.PropertyGroup, owner: str) -> None:
     Scripts that write custom properties, and files of any origin, can store them past Blender's own checks, and Blender
     takes nan for any number.
 
+    Parameters
+    ----------
+    owner : str
+        Named in the message.
+
     Raises
     ------
     SceneError
-        Names the owner, the setting, its value and the limits.
+        Names the setting, its value and the limits.
     """
     for prop in group.bl_rna.properties:
         if prop.type not in {'INT', 'FLOAT', 'ENUM'} or not group.is_property_set(prop.identifier):

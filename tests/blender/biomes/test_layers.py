@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Layers as one list: what each is and has, order, copies, removal, and what is due."""
+"""Layers as one list: what each is and has, order, copies, removal, what is due, and files that had none."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ import pytest
 
 from tests.blender.scenes import add_mesh, select
 from tetflora_addon.blender.biomes import layers
+from tetflora_addon.blender.compat import stored_properties
 from tetflora_addon.blender.placing import plant_objects, populations
 from tetflora_addon.blender.scene import crowns
 from tetflora_addon.blender.scene.fields import write_field
@@ -254,3 +255,27 @@ def test_what_is_added_next_grows_on_the_ground_of_the_active_layer():
     select()
     assert _ops().populate(count=2, species="fern", min_distance=0.1) == {'FINISHED'}
     assert [entry.object.name for entry in layers.active_layer(bpy.context.scene).grounds] == ["ground"]
+
+
+def test_files_from_before_there_were_layers_open_with_all_of_them(tmp_path):
+    """They kept populations, and in another list biomes, which these belong to."""
+    _biome("trees", "shrubs")
+    _scatter("alone")
+    _group().layers[-1].mix.add().species = "birch"
+    before = [(one.name, one.kind, len(one.mix), len(layers.children_of(one))) for one in _group().layers]
+    assert {kind for _, kind, *_ in before} == {'BIOME', 'SCATTER'}
+    stored = stored_properties(bpy.context.scene)["tetflora"]
+    kept = [one.to_dict() for one in stored["layers"]]
+    stored["biomes"] = [one for one in kept if one.pop("kind", 0) == 1]
+    stored["populations"] = [one for one in kept if one.get("uid") != "b"]
+    stored["populations_index"] = len(stored["populations"]) - 1
+    del stored["layers"]
+    assert not _group().layers
+    path = str(tmp_path / "old.blend")
+    bpy.ops.wm.save_as_mainfile(filepath=path)
+    bpy.ops.wm.open_mainfile(filepath=path)
+    now = [(one.name, one.kind, len(one.mix), len(layers.children_of(one))) for one in _group().layers]
+    assert now == before
+    assert layers.active_layer(bpy.context.scene).name == "alone"
+    assert [entry.object.name for entry in _group().layers[-1].grounds] == ["ground"]
+    assert not {"populations", "biomes"} & set(stored_properties(bpy.context.scene)["tetflora"].keys())

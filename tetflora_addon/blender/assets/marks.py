@@ -144,7 +144,10 @@ def size_of(variants: Iterable[tuple[Target, Floats]], depsgraph: bpy.types.Deps
 def reach_of(target: Target, depsgraph: bpy.types.Depsgraph) -> float:
     """Distance from an asset's origin within which all of it lies, meters in its own space.
 
-    Errors are those of `Target.parts`.
+    Raises
+    ------
+    SceneError
+        It instances itself.
     """
     boxes = [np.linalg.norm(_corners(*box), axis=-1).max() for box in _boxes(target, depsgraph)]
     return float(max(boxes, default=0.0))

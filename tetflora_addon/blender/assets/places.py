@@ -444,12 +444,16 @@ class Places:
 def read_places(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> list[Places]:
     """Places of all assets of a view layer that render: first of plants, then of objects that scatter, by name.
 
-    Errors are those of `read_asset_plants`, `variants_of` and `read_scatters`.
-
     Parameters
     ----------
     depsgraph : bpy.types.Depsgraph
         In which originals are shown, as `results.hiding.originals_shown` does.
+
+    Raises
+    ------
+    SceneError
+        A transform that is not a number, a species whose collection has no object with faces, or a marked object of a
+        kind that cannot be read; the message names the object.
     """
     found = plant_places(scene, depsgraph)
     marked = sorted((o for o in renderable_objects(depsgraph.view_layer) if is_scatter(o)), key=lambda o: o.name_full)

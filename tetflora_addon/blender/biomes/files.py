@@ -321,7 +321,10 @@ def save_biome(scene: bpy.types.Scene, name: str, description: str, picture: boo
 def import_biome(path: Path, replace: bool) -> str:
     """Take a file into the user's folder, with the picture beside it; returns the identifier.
 
-    Errors are those of `read_biome` and of `OwnFiles.store`.
+    Raises
+    ------
+    SceneError
+        The file breaks a rule of the format, or another one of its name is there.
     """
     library.OWN_FILES.store(path.stem, _read(path)[1], replace, library.picture_file(path))
     return path.stem

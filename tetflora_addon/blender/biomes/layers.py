@@ -9,6 +9,7 @@ from collections.abc import Sequence
 
 import bpy
 
+from ..compat import stored_properties
 from ..placing.plant_objects import PAINTED_MARK, note_field, plant_collection
 from ..placing.populations import add_population
 from ..placing.rules import BIOME_ONLY, awaits_update, copy_settings, free_seed, grounds_of, set_grounds
@@ -227,9 +228,24 @@ def bring_together(scene: bpy.types.Scene) -> None:
     scene.tetflora.layers_index = max(index_of(scene, shown), min(len(layers) - 1, 0))
 
 
+def _read_older(scene: bpy.types.Scene) -> None:
+    """Take over what a file from before there were layers keeps: populations, and biomes in a list of their own."""
+    stored = (stored_properties(scene) or {}).get("tetflora")
+    if stored is None or "populations" not in stored:
+        return
+    kinds = scene.tetflora.bl_rna.properties["layers"].fixed_type.properties["kind"].enum_items
+    biomes = [{**one.to_dict(), "kind": kinds[BIOME].value} for one in stored.get("biomes", ())]
+    layers = [*stored.get("layers", ()), *stored["populations"]]
+    stored["layers"] = biomes + [one.to_dict() for one in layers]
+    scene.tetflora.layers_index = len(biomes) + stored.get("populations_index", 0)
+    for name in ("populations", "populations_index", "biomes", "biomes_index"):
+        stored.pop(name, None)
+
+
 def _on_load(*_: object) -> None:
     for scene in bpy.data.scenes:
         if scene.library is None:
+            _read_older(scene)
             bring_together(scene)
 
 

@@ -97,7 +97,18 @@ class Parser(argparse.ArgumentParser):
 
 
 def main(arguments: Sequence[str]) -> int:
-    """Run one command, what follows ``--command tetflora``, on the open file; returns the exit code, see above."""
+    """Run one command on the open file.
+
+    Parameters
+    ----------
+    arguments : sequence of str
+        What follows ``--command tetflora``.
+
+    Returns
+    -------
+    int
+        Exit code, see above.
+    """
     return run(_parser(), arguments)
 
 

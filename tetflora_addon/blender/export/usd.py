@@ -45,7 +45,13 @@ _NAMES = {'FLOAT': "Float", 'INT': "Int", 'INT32_2D': "Int2", 'FLOAT_VECTOR': "F
 
 
 def library() -> SimpleNamespace:
-    """USD's modules; a `TetFloraError` where this Blender has none."""
+    """USD's modules.
+
+    Raises
+    ------
+    TetFloraError
+        This Blender has none.
+    """
     if (found := usd()) is None:
         raise TetFloraError("This Blender was built without USD; choose glTF or OBJ, or use another build")
     return found

@@ -55,7 +55,12 @@ _FINEST, _MOST_CELLS = 0.5, 4_000_000  # of the grid that heights are read from:
 
 
 def read_raster(order: Import, path: Path | None = None) -> Job[Raster]:
-    """Read the raster of an import, its tiles as one, or all of another file in its place; yields progress.
+    """Read the raster of an import, its tiles as one; yields progress.
+
+    Parameters
+    ----------
+    path : Path, optional
+        Another file, which is read whole, in its place.
 
     Raises
     ------
@@ -138,7 +143,7 @@ def _loaded(path: Path, unreadable: str) -> bpy.types.Image:
 
 @importing
 def terrain_steps(order: Import, most: int, image: Path | None = None) -> Steps:
-    """Make ground; see `importing`.
+    """Make ground; yields progress. Closing the steps leaves all as it was.
 
     Parameters
     ----------
@@ -146,6 +151,11 @@ def terrain_steps(order: Import, most: int, image: Path | None = None) -> Steps:
         Faces.
     image : Path, optional
         An orthophoto, which becomes its color.
+
+    Raises
+    ------
+    SceneError
+        The file is broken, or cannot lie in this scene.
     """
     raster = yield from read_raster(order)
     photo = None if image is None else _photo_place(image, raster.system)
@@ -272,12 +282,17 @@ BUILDING_MARK = "tetflora_building"
 
 @importing
 def outline_steps(order: Import, kind: str = "") -> Steps:
-    """Make curves of the outlines in a file; see `importing`.
+    """Make curves of the outlines in a file; yields progress. Closing the steps leaves all as it was.
 
     Parameters
     ----------
     kind : str
         What all are taken for; empty to tell them by their keys.
+
+    Raises
+    ------
+    SceneError
+        The file is broken, or cannot lie in this scene.
     """
     progress = Progress(0.0, f"Reading {order.path.name}")
     yield progress

@@ -77,7 +77,13 @@ def chosen_columns(table: Iterable[TetFloraInventoryColumn]) -> str:
 
 
 def columns_in(text: str) -> dict[str, str]:
-    """What columns hold by their titles, from JSON; a `SceneError` where it is none."""
+    """What columns hold by their titles, from JSON.
+
+    Raises
+    ------
+    SceneError
+        It is none.
+    """
     try:
         columns = json.loads(text or "{}")
     except (ValueError, RecursionError) as error:
@@ -156,7 +162,7 @@ _GENERIC = "broadleaf_tree"
 def inventory_steps(
     order: Import, unknown: str, units: str, skip: bool, columns: Mapping[str, str] | None = None
 ) -> Steps:
-    """Make a field of the trees of a file; see `importing`.
+    """Make a field of the trees of a file; yields progress. Closing the steps leaves all as it was.
 
     Parameters
     ----------
@@ -164,6 +170,11 @@ def inventory_steps(
         `GENERIC`, `LEFT_OUT`, or the identifier of a species for trees of species that nobody knows.
     units, skip, columns
         As of `read_inventory`.
+
+    Raises
+    ------
+    SceneError
+        The file is broken, or cannot lie in this scene.
     """
     progress = Progress(0.0, f"Reading {order.path.name}")
     yield progress

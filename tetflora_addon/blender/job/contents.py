@@ -154,10 +154,15 @@ def read_scene(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> SceneC
 
 
 def compile_for(identifiers: tuple[str, ...], scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> Flora:
-    """Load and compile species, leaf objects of the scene included; errors are those of `resolved_species`.
+    """Load and compile species, leaf objects of the scene included.
 
     Without any, for meshes alone, it is a shipped one of which nothing grows: the artist's own files and edits that the
     scene does not use must not take time or raise errors.
+
+    Raises
+    ------
+    SpeciesError
+        Unknown or broken species, or a leaf object that is missing or not a mesh with faces.
     """
     return compile_species(load_for(identifiers, scene, depsgraph))
 
@@ -201,7 +206,13 @@ def estimate(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> Statisti
 
 
 def check_settings(scene: bpy.types.Scene) -> None:
-    """Refuse settings of a scene that are beyond their limits; errors are those of `check_limits`."""
+    """Refuse settings of a scene that are beyond their limits.
+
+    Raises
+    ------
+    SceneError
+        Names the setting, its value and the limits.
+    """
     for group in (scene.tetflora, scene.tetflora.wind, scene.tetflora.year, scene.tetflora.output):
         check_limits(group, f'Scene "{scene.name}"')
 

@@ -467,12 +467,17 @@ def refine(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, **options: ob
 
 
 def clear(scene: bpy.types.Scene, for_render: bool | None = None) -> int:
-    """Remove only what refinement made for a scene; how many datablocks.
+    """Remove only what refinement made for a scene.
 
     Parameters
     ----------
     for_render : bool, optional
         Only what was made for a render (True), only what the artist made (False), or both (None).
+
+    Returns
+    -------
+    int
+        Number of datablocks removed.
     """
     removed = remove_results(scene, {None: None, True: 'RENDER', False: 'VIEW'}[for_render])
     if not for_render:

@@ -564,7 +564,13 @@ class Looks:
         self._reader = FaceReader(_FEW_TEXELS)
 
     def of(self, material: bpy.types.Material | None, attributes: dict[str, NDArray]) -> Look:
-        """Means over a material, which may take its color from attributes (n, k) float32 of the mesh that wears it."""
+        """Look of a material.
+
+        Parameters
+        ----------
+        attributes : mapping of str to (n, k) float32
+            Of the mesh that wears it, for those that take their color from one.
+        """
         if material is None:
             return Look()
         types = {name: 'FLOAT2' if values.shape[1] == 2 else 'FLOAT_VECTOR' for name, values in attributes.items()}

@@ -139,10 +139,16 @@ class Term:
 
 
 class Graph:
-    """A node tree under construction; if it is fresh, it is emptied first.
+    """A node tree under construction.
 
     Sockets are found by identifier or, for the sockets of groups, by name: identifiers stayed the same where 5.x
     renamed "Fac" to "Factor".
+
+    Parameters
+    ----------
+    tree : bpy.types.NodeTree
+    fresh : bool
+        Whether it is emptied first.
     """
 
     def __init__(self, tree: bpy.types.NodeTree, fresh: bool = True) -> None:

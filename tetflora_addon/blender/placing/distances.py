@@ -27,12 +27,24 @@ SOURCES = (('SPECIES', "Species", "From the crowns of the species", 0), ('OWN', 
 
 
 def weights_of(population: bpy.types.PropertyGroup) -> dict[str, float]:
-    """Relative frequency of each species of a population, at least one; errors are those of `default_species`."""
+    """Relative frequency of each species of a population, at least one.
+
+    Raises
+    ------
+    SpeciesError
+        The catalog is empty.
+    """
     return _summed((entry.species or default_species(), entry.weight) for entry in population.mix)
 
 
 def painted_weights(scene: bpy.types.Scene) -> dict[str, float]:
-    """The same of each species that the brush of a scene paints."""
+    """Relative frequency of each species that the brush of a scene paints, at least one.
+
+    Raises
+    ------
+    SpeciesError
+        The catalog is empty.
+    """
     brush = scene.tetflora.brush
     if brush.source == 'ONE' and brush.species:
         return {brush.species: 1.0}

@@ -197,7 +197,17 @@ def add_field(
     collection: bpy.types.Collection | None = None,
     ages: np.ndarray | None = None,
 ) -> bpy.types.Object:
-    """Make one field of the plants of a placement; parameters are those of `add_plants_steps`."""
+    """Make one field of the plants of a placement.
+
+    Parameters
+    ----------
+    species : sequence of str
+        Identifiers that ``placement.species`` refers to.
+    collection : bpy.types.Collection, optional
+        Where it goes; the scene's collection for plants if not given.
+    ages : (n,) float, optional
+        Years; all are full-grown if not given.
+    """
     rows = (placement.position, placement.rotation, placement.scale, placement.species, placement.seed)
     return link_field(scene, fields.write_field(FIELD, *rows, species, ages=ages), collection)
 
@@ -269,9 +279,12 @@ def plants_from_field(
 
 
 def remove_fields(objects: Iterable[bpy.types.Object], tidy: bool = True) -> int:
-    """Delete fields that TetFlora made, and if ``tidy`` collections that this leaves empty; how many plants went.
+    """Delete fields that TetFlora made; others keep their object and lose the mark. How many plants they stored.
 
-    Others keep their object and lose the mark.
+    Parameters
+    ----------
+    tidy : bool
+        Remove collections that this leaves empty.
     """
     gone = [o for o in fields.fields_of(objects) if o.library is None]
     number = sum(fields.stored_size(field) for field in gone)

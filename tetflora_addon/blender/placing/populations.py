@@ -242,7 +242,13 @@ def restored(scene: bpy.types.Scene) -> Iterator[None]:
 
 
 def refuse_frozen(population: TetFloraLayer) -> None:
-    """Refuse to replace the plants of a frozen population with a `SceneError`."""
+    """Keep the plants of a frozen population from being replaced.
+
+    Raises
+    ------
+    SceneError
+        It is frozen.
+    """
     if population.frozen:
         raise SceneError(f'"{population.name}" is frozen and keeps its plants; turn off Freeze to change it')
 

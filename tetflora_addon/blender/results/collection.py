@@ -37,6 +37,14 @@ class Results:
 
     So nobody sees anything twice. A first look is finished, and what is made after it takes its place tile by tile.
     `discard` removes all that has no place yet.
+
+    Parameters
+    ----------
+    purpose : {'VIEW', 'RENDER'}
+    mark : str
+        Suffix of all names, where there are results of several cameras at the same time.
+    data : JobData, optional
+        Of the job, which ends when somebody deletes its results.
     """
 
     scene: bpy.types.Scene

@@ -177,7 +177,10 @@ OVERRIDES = "tetflora_hidden_overrides"
 def hide_originals(scene: bpy.types.Scene, purpose: str, originals: Sequence[bpy.types.Object]) -> None:
     """Hide objects that results replace, in viewports too unless the results are only for a render.
 
-    Errors are those of `hide_linked`; nothing is hidden then.
+    Raises
+    ------
+    SceneError
+        One is linked in such a way that it cannot be hidden: see `check_linked`. None is hidden then.
     """
     apart = [original for original in originals if original.library is not None or is_switched(original)]
     hide_linked(scene, purpose, apart)

@@ -140,7 +140,13 @@ def name_of(identifier: str) -> str:
 
 
 def refuse_asset(scene: bpy.types.Scene | None, identifier: str) -> None:
-    """Refuse an asset, there or deleted, with a `SpeciesError` where a species is needed that grows."""
+    """Refuse an asset where a species is needed that grows.
+
+    Raises
+    ------
+    SpeciesError
+        It is one; or it was one, and its object was deleted.
+    """
     entry = find_asset(scene, identifier)
     if entry is not None:
         name = readable(name_of(identifier), NAME)

@@ -247,7 +247,10 @@ def write_species(scene: bpy.types.Scene, identifier: str, path: Path) -> Path:
 def save_species(scene: bpy.types.Scene, identifier: str) -> Path:
     """Save a species into the user's own folder, over an earlier file of that name.
 
-    Errors are those of `write_species` and of `OwnFiles.store`.
+    Raises
+    ------
+    SpeciesError
+        As `write_species`; or there is no folder.
     """
     species_for(scene, identifier)
     return OWN_FILES.store(identifier, as_text(species_data(scene, identifier)), replace=True)

@@ -256,7 +256,10 @@ def change_species(scene: bpy.types.Scene, identifier: str, change: Callable[[di
 def store_species(scene: bpy.types.Scene, identifier: str, data: dict[str, Any]) -> None:
     """Keep a decoded species in this file under an identifier, in place of an earlier one.
 
-    Errors are those of `checked_identifier`.
+    Raises
+    ------
+    SpeciesError
+        The identifier breaks the rule for them.
     """
     checked_identifier(identifier)
     text = json.dumps(data, ensure_ascii=False)
