@@ -323,7 +323,11 @@ def _repeated(indices: Integers, corners: int, times: int) -> Integers32:
 
 
 def simple_crowns(
-    matrices: Floats, size: tuple[float, float, float], color: Sequence[float], boxes: bool = False
+    matrices: Floats,
+    size: tuple[float, float, float],
+    color: Sequence[float],
+    wood: Sequence[float] | None = None,
+    boxes: bool = False,
 ) -> Shapes:
     """Plants of one size as crowns, stretched and turned as their places are; of very many every second, or third.
 
@@ -333,8 +337,8 @@ def simple_crowns(
         To world space.
     size : tuple of float
         Radius of the crown, its base and its top above the ground, meters.
-    color : (3,) float
-        Linear RGB.
+    color, wood : (3,) float
+        Linear RGB. Where that of the wood is not known, it is that of the crown in its shade.
     boxes : bool
         Edges of boxes instead of faces.
     """
@@ -348,8 +352,8 @@ def simple_crowns(
     else:
         radius, base, top = np.full((3, len(shown)), np.array(size)[:, None])
         heights, widths = np.column_stack([base, top]), np.column_stack([radius, radius])
-        # What bears the crown is not known; it is in its shade.
-        positions, colors = _crowns(feet, frame, heights, widths, _THIN * top, leaves, _SHADE * leaves)
+        wood = _SHADE * leaves if wood is None else np.tile(wood, (len(shown), 1))
+        positions, colors = _crowns(feet, frame, heights, widths, _THIN * top, leaves, wood)
         indices = _faces()
     indices = _repeated(indices, len(positions) // max(len(shown), 1), len(shown))
     return Shapes(positions, colors, indices, len(shown), of, origin)

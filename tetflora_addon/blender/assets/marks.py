@@ -27,6 +27,7 @@ from ..materials.face_looks import GRAY, Looks
 from ..materials.nodes import is_ours
 from ..scene.objects import SURFACE_TYPES, may_instance
 from ..species.asset_species import (
+    FILLED,
     PICTURE_SIDE,
     PREFIX,
     Datablock,
@@ -226,7 +227,7 @@ def _drawn(points: Floats, normals: Floats, colors: Floats, low: Floats, high: F
     side = PICTURE_SIDE * _FINER
     middle, extent = 0.5 * (low + high), max(float((high - low).max()), 1e-9)
     away = points - middle
-    scale = 0.92 * side / extent
+    scale = FILLED * side / extent
     column = np.floor(0.5 * side + scale * (away @ _SIDE)).astype(np.int64)
     row = np.floor(0.5 * side + scale * (away @ _UP)).astype(np.int64)
     depth = away @ np.cross(_SIDE, _UP)

@@ -24,7 +24,7 @@ from ...growth.wind import rotation_vectors
 from ...species.kinds import Kind, species_of
 from ..attributes import frames_of, moves, world_matrix
 from ..settings import season_of
-from ..species.asset_species import asset_of, asset_species, find_asset, name_of
+from ..species.asset_species import PREFIX, asset_of, asset_species, find_asset, name_of
 from ..species.edits import catalog, edited_infos, species_for
 from .ages import Part, classed
 from .fields import read_aged_field, read_field_matrices, stored_ages
@@ -354,6 +354,11 @@ def _unknown(odd: list[tuple[str, str]]) -> str:
         return (
             f'{names}: "{name_of(species)}", which was used as their species, was deleted; undo that, or choose '
             "another species in the TetFlora tab of the sidebar"
+        )
+    if species.startswith(PREFIX):
+        return (
+            f"{names}: the object or collection that was their species is not used as one any more; click Use as "
+            "Species on it again, or choose another species in the TetFlora tab of the sidebar"
         )
     more = len({other for _, other in odd}) - 1
     return (

@@ -20,6 +20,7 @@ import numpy as np
 from bpy.props import FloatVectorProperty
 from numpy.typing import NDArray
 
+from ...arrays import Floats, linear_of
 from ...errors import NAME, SpeciesError, readable
 from ...files import is_identifier
 from ...species.catalog import FileInfo
@@ -27,8 +28,8 @@ from ..declare import boolean, pointer_to, real, string
 
 #: What identifiers of assets begin with.
 PREFIX = "asset-"
-#: Side of stored pictures in pixels.
-PICTURE_SIDE = 64
+#: Side of stored pictures in pixels, and the fraction of it that the asset fills.
+PICTURE_SIDE, FILLED = 64, 0.92
 
 Datablock = bpy.types.Object | bpy.types.Collection
 
@@ -170,3 +171,13 @@ def picture_of(entry: TetFloraAssetSpecies) -> NDArray[np.uint8] | None:
     except (ValueError, zlib.error):
         return None
     return np.frombuffer(pixels, np.uint8).reshape(PICTURE_SIDE, PICTURE_SIDE, 4) if len(pixels) == size else None
+
+
+def wood_color(entry: TetFloraAssetSpecies) -> Floats | None:
+    """Linear RGB (3,) of the lower half of what bears the crown, as the picture shows it; None where nothing does."""
+    if (picture := picture_of(entry)) is None:
+        return None
+    share = (0.5 * entry.base - 0.5 * entry.height) / max(entry.height, 2.0 * entry.radius)
+    seen = picture[: max(int(PICTURE_SIDE * (0.5 + FILLED * share)), 0)].reshape(-1, 4) / 255.0
+    cover = seen[:, 3:]
+    return (linear_of(seen[:, :3]) * cover).sum(axis=0) / cover.sum() if cover.any() else None
