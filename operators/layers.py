@@ -146,7 +146,7 @@ class TETFLORA_OT_update_layers(ModalJob, Operator, label="Update", needs=_ACTIV
                 continue
             name = layer.name
             try:
-                with closing(self._steps_of(scene, depsgraph, layer)) as steps:
+                with closing(self._steps_of(scene, depsgraph, layer, uids[number + 1 :])) as steps:
                     one = yield from part_of(steps, number / len(uids), (number + 1) / len(uids), name)
                 made.append(one)
                 if isinstance(one, PlacedPlants) and one.reason and not one.number:
@@ -162,7 +162,11 @@ class TETFLORA_OT_update_layers(ModalJob, Operator, label="Update", needs=_ACTIV
         return made, bare, kept
 
     def _steps_of(
-        self, scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, layer: bpy.types.PropertyGroup
+        self,
+        scene: bpy.types.Scene,
+        depsgraph: bpy.types.Depsgraph,
+        layer: bpy.types.PropertyGroup,
+        later: list[str],
     ) -> Job[PlacedPlants | growing.GrownStand]:
         if layer.kind == FIELD:
             if not growing.is_stand(layer.field):
@@ -174,7 +178,7 @@ class TETFLORA_OT_update_layers(ModalJob, Operator, label="Update", needs=_ACTIV
             return growing.again_steps(scene, depsgraph, layer.field)
         if self.forget_erased:
             layer.erased = ""
-        return (reroll_steps if self.reroll else make_plants_steps)(scene, depsgraph, layer)
+        return (reroll_steps if self.reroll else make_plants_steps)(scene, depsgraph, layer, later)
 
     def finish(self, context: bpy.types.Context, result: Updated) -> set[str]:
         points.schedule()
