@@ -127,10 +127,7 @@ def need(test: Callable[[bpy.types.Context], object], message: str) -> Need:
 
 
 in_object_mode = need(lambda context: context.mode == 'OBJECT', "Only available in Object Mode")
-scene_here = need(
-    lambda context: context.scene.library is None,
-    "The scene is linked from another file; open that file, or append the scene",
-)
+scene_here = need(lambda context: context.scene.library is None, "The scene is linked; open its file, or append it")
 
 
 def plants_selected(context: bpy.types.Context) -> str:

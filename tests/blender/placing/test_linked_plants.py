@@ -122,7 +122,7 @@ def test_a_linked_scene_is_refused_with_what_to_do(clean_file, tmp_path, capfd):
     home, bpy.context.window.scene = bpy.context.scene, wanted.scenes[0]
     try:
         for name in ("refine", "look", "daylight", "paint_plants", "update_layers"):
-            with pytest.raises(RuntimeError, match="scene is linked from another file; open that file, or append"):
+            with pytest.raises(RuntimeError, match="scene is linked; open its file, or append it"):
                 getattr(bpy.ops.tetflora, name)()
         tiny_render()
         bpy.ops.render.render()

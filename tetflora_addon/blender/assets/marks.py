@@ -253,9 +253,8 @@ def can_be_species(datablock: Datablock) -> bool:
     """Whether an object or collection may be used as a species; cheap."""
     if isinstance(datablock, bpy.types.Collection):
         return not is_ours(datablock)
-    group = datablock.tetflora
-    plant = group.is_plant or group.is_field
-    return not plant and not is_ours(datablock) and (datablock.type in SURFACE_TYPES or may_instance(datablock))
+    plant = datablock.tetflora.is_plant or datablock.tetflora.is_field or is_ours(datablock)
+    return not plant and (datablock.type in SURFACE_TYPES or may_instance(datablock))
 
 
 def use_as_species(
@@ -336,8 +335,6 @@ def measure_all(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, identifi
 
 def stop_using(datablock: Datablock) -> int:
     """Use an object or a collection as a species no more; how many entries there were. Plants of it stay."""
-    if isinstance(datablock, bpy.types.Object) and asset_of(datablock) is None and datablock.instance_collection:
-        datablock = datablock.instance_collection
     removed = 0
     while (entry := asset_of(datablock)) is not None and entry.id_data.library is None:
         _remove(entry)
@@ -355,12 +352,7 @@ def _remove(entry: TetFloraAssetSpecies) -> None:
 
 def is_species(datablock: Datablock | None) -> bool:
     """Whether an object or a collection is used as a species, or an empty shows one that is; cheap."""
-    if datablock is None:
-        return False
-    within = datablock.instance_collection if isinstance(datablock, bpy.types.Object) else None
-    if within is not None and asset_of(within) is not None:
-        return True
-    entry = asset_of(datablock)
+    entry = None if datablock is None else asset_of(datablock)
     return entry is not None and datablock_of(entry) is not None
 
 

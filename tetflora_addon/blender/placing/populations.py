@@ -114,9 +114,8 @@ def make_plants_steps(data: JobData, population: TetFloraLayer, later: Collectio
     above = (yield from canopy_steps(progress, scene, depsgraph)) if is_cover(population) else None
     yield from crown_steps(progress, scene, kinds)
     population = still_there(data, uid)
-    without = {o for o in scene.objects if later and o.tetflora.population in later}
-    without.update(_sorted_out(scene, population)[0])
-    search = read_search(scene, depsgraph, population, without, above=above)
+    own = [o for o in scene.objects if later and o.tetflora.population in later] + _sorted_out(scene, population)[0]
+    search = read_search(scene, depsgraph, population, set(own), above=above)
     progress = Progress(0.1, "Looking for places")
     yield progress
     placement = yield from call_in_thread(progress, search.placement)

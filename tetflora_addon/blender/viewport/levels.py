@@ -147,9 +147,8 @@ def _asset_crowns(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, boxes:
         crown, layer = crown_for(scene, plants.species), depsgraph.view_layer
         seen = plants.matrices[[owner.visible_get(view_layer=layer) for owner in plants.owners]]
         if len(seen):
-            asset = find_asset(scene, plants.species)
-            wood = None if asset is None else wood_color(asset)
-            found.append(simple_crowns(seen, (crown.radius, crown.base, crown.height), crown.color, wood, boxes))
+            colors = crown.color, wood_color(find_asset(scene, plants.species))
+            found.append(simple_crowns(seen, (crown.radius, crown.base, crown.height), colors, boxes))
     return found
 
 
