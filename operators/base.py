@@ -67,7 +67,8 @@ class Tool:
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        reason = cls.missing(context)
+        changes = 'UNDO' in cls.bl_options and cls.bl_idname != "tetflora.first_forest"  # which makes a scene
+        reason = (scene_here(context) if changes else "") or cls.missing(context)
         if reason:
             cls.poll_message_set(reason)
         return not reason
@@ -126,6 +127,7 @@ def need(test: Callable[[bpy.types.Context], object], message: str) -> Need:
 
 
 in_object_mode = need(lambda context: context.mode == 'OBJECT', "Only available in Object Mode")
+scene_here = need(lambda context: context.scene.library is None, "The scene is linked; open its file, or append it")
 
 
 def plants_selected(context: bpy.types.Context) -> str:

@@ -23,7 +23,7 @@ from ..tetflora_addon.blender.species.edits import catalog, display_height
 from ..tetflora_addon.blender.viewport.points import GroundCursor, circle
 from ..tetflora_addon.errors import SceneError, TetFloraError
 from ..tetflora_addon.planting.strokes import dabs_along
-from .base import NO_VIEWPORT, Tool, counted, in_object_mode, select_only
+from .base import NO_VIEWPORT, Tool, counted, in_object_mode, scene_here, select_only
 
 # Turning and moving the view, which goes on while a tool runs.
 NAVIGATION = {
@@ -43,7 +43,7 @@ class GroundTool(Tool):
     """Mix-in for modal operators in a 3D view that point at the ground."""
 
     bl_options = {'REGISTER'}  # each plant or stroke is an undo step of its own
-    needs = (in_object_mode,)
+    needs = (in_object_mode, scene_here)
 
     _cursor: GroundCursor | None = None
     _ground: Ground | None = None

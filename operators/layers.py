@@ -146,7 +146,7 @@ class TETFLORA_OT_update_layers(ModalJob, Operator, label="Update", needs=_ACTIV
                 continue
             name = layer.name
             try:
-                with closing(self._steps_of(scene, depsgraph, layer)) as steps:
+                with closing(self._steps_of(depsgraph, layer, uids[number + 1 :])) as steps:
                     one = yield from part_of(steps, number / len(uids), (number + 1) / len(uids), name)
                 made.append(one)
                 if isinstance(one, PlacedPlants) and one.reason and not one.number:
@@ -162,7 +162,7 @@ class TETFLORA_OT_update_layers(ModalJob, Operator, label="Update", needs=_ACTIV
         return made, bare, kept
 
     def _steps_of(
-        self, scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, layer: bpy.types.PropertyGroup
+        self, depsgraph: bpy.types.Depsgraph, layer: bpy.types.PropertyGroup, later: list[str]
     ) -> Job[PlacedPlants | growing.GrownStand]:
         if layer.kind == FIELD:
             if not growing.is_stand(layer.field):
@@ -171,10 +171,10 @@ class TETFLORA_OT_update_layers(ModalJob, Operator, label="Update", needs=_ACTIV
                 raise SceneError(f'"{layer.name}" is frozen and keeps its plants; turn off Freeze to change it')
             if self.reroll:
                 layer.field.tetflora.stand.seed += 1
-            return growing.again_steps(scene, depsgraph, layer.field)
+            return growing.again_steps(layer.id_data, depsgraph, layer.field)
         if self.forget_erased:
             layer.erased = ""
-        return (reroll_steps if self.reroll else make_plants_steps)(scene, depsgraph, layer)
+        return (reroll_steps if self.reroll else make_plants_steps)(layer.id_data, depsgraph, layer, later)
 
     def finish(self, context: bpy.types.Context, result: Updated) -> set[str]:
         points.schedule()
@@ -230,10 +230,10 @@ class TETFLORA_OT_move_layer(Reporting, Operator, label="Move Layer", told="dire
 
     def run(self, context: bpy.types.Context) -> set[str]:
         scene = context.scene
-        regroup = {'IN': layers.group_layer, 'OUT': layers.ungroup_layer}.get(self.direction)
-        if regroup is not None and not regroup(scene):
-            refusal = {'IN': "Select a single layer to group", 'OUT': "This layer is not in a group"}
-            return self.refused(refusal[self.direction])
+        if self.direction == 'IN' and not layers.group_layer(scene):
+            return self.refused("Select a single layer to group")
+        if self.direction == 'OUT' and not layers.ungroup_layer(scene):
+            return self.refused("This layer is not in a group")
         if self.direction in {'UP', 'DOWN'} and not layers.move_layer(scene, -1 if self.direction == 'UP' else 1):
             return {'CANCELLED'}
         points.schedule()

@@ -5,14 +5,7 @@
 import bpy
 from bpy.types import Operator
 
-from ..tetflora_addon.blender.assets.marks import (
-    can_be_species,
-    is_species,
-    scattered,
-    species_shown,
-    stop_using,
-    use_as_species,
-)
+from ..tetflora_addon.blender.assets.marks import can_be_species, is_species, scattered, stop_using, use_as_species
 from ..tetflora_addon.blender.biomes.layers import forget_gone
 from ..tetflora_addon.blender.declare import boolean, choice, once, string
 from ..tetflora_addon.blender.placing import plant_objects
@@ -20,7 +13,7 @@ from ..tetflora_addon.blender.placing.populations import adopt, collection_of, o
 from ..tetflora_addon.blender.placing.properties import MOST_EMPTIES
 from ..tetflora_addon.blender.scene.fields import FIELD_TYPES, fields_of
 from ..tetflora_addon.blender.scene.objects import SURFACE_TYPES, is_scatter, mark_scatter, may_instance, may_scatter
-from ..tetflora_addon.blender.species.asset_species import Datablock
+from ..tetflora_addon.blender.species.asset_species import Datablock, asset_of
 from ..tetflora_addon.blender.species.catalog import default_species
 from ..tetflora_addon.blender.species.edits import catalog
 from ..tetflora_addon.errors import SceneError, listed
@@ -266,8 +259,7 @@ class TETFLORA_OT_edit_list(
 def chosen(context: bpy.types.Context, name: str = "") -> list[Datablock]:
     """What an operator is for: the collection of that name, else what is selected in the Outliner or the 3D view."""
     if name:
-        found = bpy.data.collections.get(name)
-        return [] if found is None else [found]
+        return [found] if (found := bpy.data.collections.get(name)) else []
     if context.area is not None and context.area.type == 'OUTLINER':
         return [i for i in context.selected_ids if isinstance(i, bpy.types.Object | bpy.types.Collection)]
     return list(context.selected_objects)
@@ -292,9 +284,7 @@ class TETFLORA_OT_use_as_species(Reporting, Operator, label="Use as Species", to
     def missing(cls, context: bpy.types.Context) -> str:
         # A script may name a collection, whatever is selected.
         by_script = context.area is None or context.area.type != 'VIEW_3D'
-        found = (by_script and bpy.data.collections) or any(
-            can_be_species(one) or is_species(one) for one in chosen(context)
-        )
+        found = (by_script and bpy.data.collections) or any(can_be_species(o) or is_species(o) for o in chosen(context))
         nothing = "Select objects with faces, or a collection in the Outliner, first"
         return in_object_mode(context) or ("" if found else nothing)
 
@@ -312,8 +302,7 @@ class TETFLORA_OT_use_as_species(Reporting, Operator, label="Use as Species", to
         names, wrong = [], []
         for datablock in found:
             try:
-                made = use_as_species(context.scene, depsgraph, datablock, self.variants)
-                names.append(made.name)
+                names.append(use_as_species(context.scene, depsgraph, datablock, self.variants).name)
             except SceneError as error:
                 wrong.append(str(error))
         if not names:
@@ -326,7 +315,7 @@ class TETFLORA_OT_use_as_species(Reporting, Operator, label="Use as Species", to
     def _stop(self, context: bpy.types.Context, found: list[Datablock]) -> set[str]:
         if not found:
             return self.refused("Select an object that is used as a species first")
-        species = {asset.identifier for one in found if (asset := species_shown(one)) is not None}
+        species = {asset.identifier for one in found if (asset := asset_of(one)) is not None}
         number = sum(stop_using(one) > 0 for one in found)
         plants = sum(o.tetflora.is_plant and o.tetflora.species in species for o in context.scene.objects)
         rest = f"; {counted(plants, 'plant')} of it need another species" if plants else ""

@@ -30,9 +30,8 @@ class TETFLORA_OT_assign_species(Reporting, Operator, label="Change Species", ne
         if self.species in {"", NO_SPECIES}:
             return self.failed("Choose a species")
         changed = plant_objects.assign_species(selected_plants(context), self.species)
-        for field in fields_of(context.selected_objects):
-            if plant_objects.assign_field_species(field, self.species):
-                changed += stored_size(field)
+        fields = fields_of(context.selected_objects)
+        changed += sum(stored_size(o) for o in fields if plant_objects.assign_field_species(o, self.species))
         return self.done(f"{counted(changed, 'plant')} changed")
 
 
@@ -77,10 +76,8 @@ class TETFLORA_OT_select_plants(Reporting, Operator, label="Select Plants", need
         if not self.extend:
             for obj in context.selected_objects:
                 obj.select_set(False)
-        within = set(context.view_layer.objects)
-        for obj in found:
-            if obj in within:
-                obj.select_set(True)
+        for obj in set(found) & set(context.view_layer.objects):
+            obj.select_set(True)
         of = "" if self.layer else f' of species "{self.species}"'
         return self.done(f"{counted(len(found), 'plant')}{of} selected")
 

@@ -323,7 +323,7 @@ def _repeated(indices: Integers, corners: int, times: int) -> Integers32:
 
 
 def simple_crowns(
-    matrices: Floats, size: tuple[float, float, float], color: Sequence[float], boxes: bool = False
+    matrices: Floats, size: tuple[float, float, float], colors: Sequence[Sequence[float]], boxes: bool = False
 ) -> Shapes:
     """Plants of one size as crowns, stretched and turned as their places are; of very many every second, or third.
 
@@ -333,14 +333,15 @@ def simple_crowns(
         To world space.
     size : tuple of float
         Radius of the crown, its base and its top above the ground, meters.
-    color : (3,) float
-        Linear RGB.
+    colors : (2, 3) float
+        Of leaves and wood, linear RGB.
     boxes : bool
         Edges of boxes instead of faces.
     """
     of, origin = len(matrices), origin_near(matrices[:, :3, 3])
     shown = matrices[:: max(-(-of // MOST_PLANTS), 1)]
-    feet, frame, leaves = shown[:, :3, 3] - origin, shown[:, :3, :3], np.tile(color, (len(shown), 1))
+    feet, frame = shown[:, :3, 3] - origin, shown[:, :3, :3]
+    leaves, wood = (np.tile(color, (len(shown), 1)) for color in colors)
     if boxes:
         corners, indices = _box(*size)
         positions = (corners @ frame.transpose(0, 2, 1) + feet[:, None]).reshape(-1, 3).astype(np.float32)
@@ -348,8 +349,7 @@ def simple_crowns(
     else:
         radius, base, top = np.full((3, len(shown)), np.array(size)[:, None])
         heights, widths = np.column_stack([base, top]), np.column_stack([radius, radius])
-        # What bears the crown is not known; it is in its shade.
-        positions, colors = _crowns(feet, frame, heights, widths, _THIN * top, leaves, _SHADE * leaves)
+        positions, colors = _crowns(feet, frame, heights, widths, _THIN * top, leaves, wood)
         indices = _faces()
     indices = _repeated(indices, len(positions) // max(len(shown), 1), len(shown))
     return Shapes(positions, colors, indices, len(shown), of, origin)

@@ -10,6 +10,7 @@ import pytest
 
 from tests.blender.assets.scatters import Nodes, read, scene, species, tree
 from tests.blender.scenes import add_mesh, add_plant, depsgraph, select
+from tetflora_addon.blender.assets.marks import stop_using
 from tetflora_addon.blender.job import contents
 from tetflora_addon.blender.scene import plants
 from tetflora_addon.blender.scene.fields import write_field
@@ -93,6 +94,41 @@ def test_the_seed_chooses_the_variant_and_nothing_else_does():
         plant.location.x += 5.0
         plant.name = f"moved {plant.name}"
     assert {o: p.target.name for p in read() for o in p.owners} == first
+
+
+def test_a_trunk_with_its_leaves_in_a_collection_is_one_plant_that_stands_where_the_trunk_does():
+    trunk, leaves, hidden = tree("trunk"), tree("leaves"), tree("hidden")
+    leaves.parent = hidden.parent = trunk
+    hidden.hide_render, trunk.location, leaves.location.z = True, (60.0, 0.0, 0.0), 3.0
+    own = species(trunk.users_collection[0], variants=True)
+    assert find_asset(scene(), own).height == pytest.approx(4.0)
+    plants = [add_plant(f"plant {seed}", species=own, seed=seed, location=(seed, 0.0, 0.0)) for seed in range(9)]
+    (found,) = read()
+    assert found.owners == tuple(plants) and found.target.datablock == trunk.users_collection[0]
+    places = [part.matrices[0] for part in found.target.parts(depsgraph())[0]]
+    stand = sorted(tuple((found.matrices[4] @ place)[:3, 3]) for place in places)
+    assert stand == [pytest.approx((4.0, 0.0, 0.0)), pytest.approx((4.0, 0.0, 3.0))]
+
+
+def test_trees_of_a_common_parent_are_variants_each():
+    empty = bpy.data.objects.new("all", None)
+    trees = [tree("one"), tree("other")]
+    trees[0].users_collection[0].objects.link(empty)
+    for one in trees:
+        one.parent = empty
+    own = species(empty.users_collection[0], variants=True)
+    for seed in range(20):
+        add_plant(f"plant {seed}", species=own, seed=seed)
+    assert {one.target.datablock for one in read()} == set(trees)
+
+
+def test_a_model_that_is_no_species_any_more_is_told_without_its_identifier():
+    own = species(tree())
+    add_plant("oak", species=own)
+    assert stop_using(bpy.data.objects["tree"]) == 1
+    with pytest.raises(SceneError, match='"oak": the object or collection that was their species') as told:
+        contents.read_scene(scene(), depsgraph())
+    assert own not in str(told.value)
 
 
 def test_dropped_collections_of_a_species_are_plants_of_it():

@@ -229,6 +229,22 @@ def test_previews_show_simple_crowns_of_the_right_size_beside_grown_plants():
     bpy.data.objects.remove(rock)
 
 
+def test_simple_crowns_stand_on_trunks_in_the_color_of_the_wood():
+    held = bpy.data.collections.new("tree")
+    for part, color in ((crown("trunk", 0.2, 0.0, 3.0), (0.4, 0.1, 0.02)), (crown("leaves"), (0.05, 0.4, 0.04))):
+        material = bpy.data.materials.new(part.name)
+        shader_tree(material).nodes["Principled BSDF"].inputs["Base Color"].default_value = (*color, 1.0)
+        part.data.materials.append(material)
+        part.location.z = 2.0 * (part.name == "leaves")
+        held.objects.link(part)
+    add_plant(species=species(held))
+    scene().tetflora.preview.plants = 'LIGHT'
+    shapes = levels.read_shapes(scene(), depsgraph())
+    foot, top = (shapes.colors[pick(shapes.positions[:, 2])] for pick in (np.argmin, np.argmax))
+    assert foot[0] > 1.5 * foot[1] and top[1] > 1.5 * top[0]
+    assert scene().tetflora.asset_species[0].base > 1.0
+
+
 def test_a_missing_asset_is_shown_as_such_in_menus():
     obj = crown("Rock")
     own = species(obj)

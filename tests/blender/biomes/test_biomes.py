@@ -494,3 +494,18 @@ def test_the_mask_of_a_biome_itself_is_saved_and_found_again():
         assert (biomes()[-1].vertex_group, biomes()[-1].image) == (group, image)
     with pytest.raises(ValueError, match='"mask" has an unknown key'):
         files.checked(SMALL | {"mask": {"slope": 1.0}}, "small")
+
+
+@pytest.mark.parametrize("which", ['ACTIVE', 'DUE'])
+def test_a_biome_that_has_not_changed_comes_again_as_it_was(which):
+    """Bushes of the second layer, which are about to go, keep no bush of the first away."""
+    bushes = SMALL["layers"][0] | {"density": 400.0, "min_distance": 3.0}
+    biome = small(layers=[bushes, bushes | {"name": "More", "density": 2000.0, "min_distance": 0.5}])
+    add(biome, add_mesh("ground", size=20.0))
+    before = places(biomes()[0].uid)
+    scene().tetflora.layers_index = 0
+    for layer in scene().tetflora.layers:
+        layer.placed_by = "" if which == 'DUE' else layer.placed_by
+    assert bpy.ops.tetflora.update_layers(which=which) == {'FINISHED'}
+    after = places(biomes()[0].uid)
+    assert len(before) > 50 and before.tolist() == after.tolist()

@@ -7,7 +7,7 @@ from __future__ import annotations
 import bpy
 import pytest
 
-from tests.blender.scenes import add_camera, add_mesh, add_plant, select
+from tests.blender.scenes import add_camera, add_mesh, add_plant, select, tiny_render
 
 pytestmark = pytest.mark.usefixtures("clean_file")
 
@@ -100,3 +100,32 @@ def test_what_is_changed_of_overrides_is_there_when_the_file_is_opened_again(lin
     assert {p.name: (p.tetflora.species, p.tetflora.seed, p.tetflora.enabled) for p in found} == changed
     assert all(seed != before[name] and species == "oak" for name, (species, seed, _) in changed.items())
     assert [p.name for p in found if p.tetflora.is_occluder and p.tetflora.is_explicit] == [min(before)]
+
+
+def test_scatter_finds_a_place_beside_overridden_plants(linked):
+    scene, layer = bpy.context.scene, bpy.context.view_layer
+    overridden = scene.collection.children[0].override_hierarchy_create(scene, layer)
+    overridden["tetflora_plants"] = True
+    select(add_mesh("own ground", size=10.0))
+    assert bpy.ops.tetflora.populate(count=3, species="bush") == {'FINISHED'}
+    assert scene.tetflora.layers[0].made == 3
+
+
+def test_a_linked_scene_is_refused_with_what_to_do(clean_file, tmp_path, capfd):
+    add_plant()
+    add_camera()
+    path = str(tmp_path / "library.blend")
+    bpy.data.libraries.write(path, {bpy.context.scene})
+    bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
+    with bpy.data.libraries.load(path, link=True) as (found, wanted):
+        wanted.scenes = list(found.scenes)
+    home, bpy.context.window.scene = bpy.context.scene, wanted.scenes[0]
+    try:
+        for name in ("refine", "look", "daylight", "paint_plants", "update_layers"):
+            with pytest.raises(RuntimeError, match="scene is linked; open its file, or append it"):
+                getattr(bpy.ops.tetflora, name)()
+        tiny_render()
+        bpy.ops.render.render()
+        assert "is linked from another file; open that file" in capfd.readouterr().err
+    finally:
+        bpy.context.window.scene = home

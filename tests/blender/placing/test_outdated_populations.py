@@ -130,3 +130,22 @@ def test_it_is_known_in_a_file_that_is_opened(tmp_path):
     assert not _outdated()
     _population().density += 1.0
     assert _outdated()
+
+
+@pytest.mark.parametrize("store", ['EMPTIES', 'FIELD'])
+def test_a_layer_whose_plants_were_all_deleted_is_due(store):
+    population = _populate()
+    population.as_field = store
+    assert bpy.ops.tetflora.update_layers(which='ACTIVE') == {'FINISHED'}
+    own = populations.own_objects(bpy.context.scene, population)
+    elsewhere = bpy.data.collections.new("elsewhere")
+    bpy.context.scene.collection.children.link(elsewhere)
+    for obj in own:  # plants that were only moved are there
+        population.collection.objects.unlink(obj)
+        elsewhere.objects.link(obj)
+    assert not rules.awaits_update(population)
+    select(*own)
+    bpy.ops.object.delete()
+    assert rules.awaits_update(population)
+    assert bpy.ops.tetflora.update_layers() == {'FINISHED'}
+    assert len(own) and populations.own_number(populations.own_objects(bpy.context.scene, population)) == 20

@@ -15,7 +15,7 @@ import pytest
 from devtools.layouts import Layout
 from devtools.partition import partition
 from panels.refine import TETFLORA_PT_refine
-from tests.blender.scenes import add_camera, add_plant, datablocks, depsgraph
+from tests.blender.scenes import add_camera, add_mesh, add_plant, datablocks, depsgraph, select
 from tetflora_addon import errors
 from tetflora_addon.blender.runtime import _after_renders
 from tetflora_addon.blender.scene.fields import write_field
@@ -380,6 +380,22 @@ def test_what_is_hidden_in_viewports_has_no_shape_there(monkeypatch, how):
         plant.hide_set(True)
     read_shapes(scene, depsgraph())
     assert state.find(scene).shapes is None and "hidden in viewports" in state.find(scene).message
+
+
+def test_results_say_that_a_layer_was_hidden_or_has_other_plants():
+    scene, _, _ = scene_of_plants(1)
+    select(add_mesh("ground", size=10.0))
+    bpy.ops.tetflora.populate(count=4, species="bush")
+    bpy.ops.tetflora.refine()
+    layer = scene.tetflora.layers[0]
+    layer.shown = False
+    assert auto.changed_since(scene) == ["the layers"]
+    layer.shown = True
+    assert auto.changed_since(scene) == []
+    bpy.ops.tetflora.update_layers(which='ACTIVE', reroll=True)
+    assert auto.changed_since(scene) == ["the layers"]
+    bpy.ops.tetflora.refine()
+    assert auto.changed_since(scene) == []
 
 
 def test_results_say_what_has_changed_since_they_were_made():

@@ -27,6 +27,7 @@ from ..materials.face_looks import GRAY, Looks
 from ..materials.nodes import is_ours
 from ..scene.objects import SURFACE_TYPES, may_instance
 from ..species.asset_species import (
+    FILLED,
     PICTURE_SIDE,
     PREFIX,
     Datablock,
@@ -228,7 +229,7 @@ def _drawn(points: Floats, normals: Floats, colors: Floats, low: Floats, high: F
     side = PICTURE_SIDE * _FINER
     middle, extent = 0.5 * (low + high), max(float((high - low).max()), 1e-9)
     away = points - middle
-    scale = 0.92 * side / extent
+    scale = FILLED * side / extent
     column = np.floor(0.5 * side + scale * (away @ _SIDE)).astype(np.int64)
     row = np.floor(0.5 * side + scale * (away @ _UP)).astype(np.int64)
     depth = away @ np.cross(_SIDE, _UP)
@@ -254,9 +255,8 @@ def can_be_species(datablock: Datablock) -> bool:
     """Whether an object or collection may be used as a species; cheap."""
     if isinstance(datablock, bpy.types.Collection):
         return not is_ours(datablock)
-    group = datablock.tetflora
-    plant = group.is_plant or group.is_field
-    return not plant and not is_ours(datablock) and (datablock.type in SURFACE_TYPES or may_instance(datablock))
+    plant = datablock.tetflora.is_plant or datablock.tetflora.is_field or is_ours(datablock)
+    return not plant and (datablock.type in SURFACE_TYPES or may_instance(datablock))
 
 
 def use_as_species(
@@ -335,8 +335,6 @@ def measure_all(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, identifi
 
 def stop_using(datablock: Datablock) -> int:
     """Use an object or a collection as a species no more; how many entries there were. Plants of it stay."""
-    if isinstance(datablock, bpy.types.Object) and asset_of(datablock) is None and datablock.instance_collection:
-        datablock = datablock.instance_collection
     removed = 0
     while (entry := asset_of(datablock)) is not None and entry.id_data.library is None:
         _remove(entry)
@@ -352,16 +350,10 @@ def _remove(entry: TetFloraAssetSpecies) -> None:
     entries.remove(next(i for i, other in enumerate(entries) if other.identifier == entry.identifier))
 
 
-def is_species(datablock: Datablock) -> bool:
+def is_species(datablock: Datablock | None) -> bool:
     """Whether an object or a collection is used as a species, or an empty shows one that is; cheap."""
-    entry = species_shown(datablock)
+    entry = None if datablock is None else asset_of(datablock)
     return entry is not None and datablock_of(entry) is not None
-
-
-def species_shown(datablock: Datablock) -> TetFloraAssetSpecies | None:
-    """The species that an object or a collection is, or else that of the collection that an empty shows."""
-    within = getattr(datablock, "instance_collection", None)
-    return asset_of(datablock) or (None if within is None else asset_of(within))
 
 
 def scattered(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Scatter:

@@ -183,7 +183,7 @@ def _plant(data: JobData, uid: str, stands: Sequence[tuple[str, int]], without: 
         title = population.name
         begin, end = (first + n / len(names) * (1.0 - _SOIL - first) for n in (number, number + 1))
         try:
-            with closing(make_plants_steps(scene, depsgraph, population)) as steps:
+            with closing(make_plants_steps(scene, depsgraph, population, names[number + 1 :])) as steps:
                 made = yield from part_of(steps, begin, end, title)
         except GoneError:
             raise

@@ -29,6 +29,7 @@ from ...emission.drawing import drawing, tiles_of
 from ...emission.emitters import Buffers, EmissionInput
 from ...emission.plants import Block, Transition, expanded_blocks
 from ...emission.polygons import PolygonBlock
+from ...errors import SceneError
 from ...jobs import Job, Progress, mapped
 from ...processes import pool
 from ...proxies.facet_weights import facet_weights, measuring, unmeasured
@@ -368,6 +369,8 @@ def refine_steps(
 def _refine_steps(run: _Run, first_look: bool) -> Job[Statistics]:
     results, depsgraph, clock, statistics = run.results, run.depsgraph, run.clock, run.statistics
     scene = results.scene
+    if scene.library is not None:
+        raise SceneError(f'The scene "{scene.name}" is linked from another file; open that file, or append the scene')
     contents.use_machine(scene)
     yield Progress(0.0, "Reading the scene")
     if run.camera is None or run.given is None:

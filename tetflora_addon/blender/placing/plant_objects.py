@@ -46,7 +46,7 @@ def plants_of(objects: Iterable[bpy.types.Object]) -> list[bpy.types.Object]:
 
 def plant_collections(scene: bpy.types.Scene) -> list[bpy.types.Collection]:
     """The scene's collections for plants that are there."""
-    return [c for c in scene.collection.children_recursive if c.get(_MARK) and c.library is None]
+    return [c for c in scene.collection.children_recursive if c.get(_MARK) and not (c.library or c.override_library)]
 
 
 def plant_collection(scene: bpy.types.Scene) -> bpy.types.Collection:

@@ -8,7 +8,7 @@ the artist's.
 """
 
 import uuid
-from collections.abc import Iterable, Iterator
+from collections.abc import Collection, Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 
@@ -94,10 +94,11 @@ def own_number(objects: Iterable[bpy.types.Object]) -> int:
 
 
 @job("Placing plants")
-def make_plants_steps(data: JobData, population: TetFloraLayer) -> Job[PlacedPlants]:
+def make_plants_steps(data: JobData, population: TetFloraLayer, later: Collection[str] = ()) -> Job[PlacedPlants]:
     """Place a population's plants by its settings, in place of those that it has.
 
-    Closing the steps, or an error, leaves the scene as it was.
+    Closing the steps, or an error, leaves the scene as it was. Plants of populations that are planted later, of which
+    the identities are given, keep nobody away.
 
     Raises
     ------
@@ -113,7 +114,8 @@ def make_plants_steps(data: JobData, population: TetFloraLayer) -> Job[PlacedPla
     above = (yield from canopy_steps(progress, scene, depsgraph)) if is_cover(population) else None
     yield from crown_steps(progress, scene, kinds)
     population = still_there(data, uid)
-    search = read_search(scene, depsgraph, population, set(_sorted_out(scene, population)[0]), above=above)
+    own = [o for o in scene.objects if later and o.tetflora.population in later] + _sorted_out(scene, population)[0]
+    search = read_search(scene, depsgraph, population, set(own), above=above)
     progress = Progress(0.1, "Looking for places")
     yield progress
     placement = yield from call_in_thread(progress, search.placement)
@@ -182,7 +184,7 @@ def _new_plants(
 
 
 def reroll_steps(
-    scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, population: TetFloraLayer
+    scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, population: TetFloraLayer, later: Collection[str] = ()
 ) -> Job[PlacedPlants]:
     """Place a population anew with another seed, which follows from the one that it has.
 
@@ -191,7 +193,7 @@ def reroll_steps(
     with restored(scene):
         # A hash and not the next number: populations with neighboring seeds would follow each other's arrangements.
         population.seed = int(uniform(child_key(key_of_seed(population.seed), 1), 0) * 2**31)
-        return (yield from make_plants_steps(scene, depsgraph, population))
+        return (yield from make_plants_steps(scene, depsgraph, population, later))
 
 
 def remove_layer(scene: bpy.types.Scene, index: int, keep_plants: bool = False) -> int:

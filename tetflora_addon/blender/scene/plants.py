@@ -24,7 +24,7 @@ from ...growth.wind import rotation_vectors
 from ...species.kinds import Kind, species_of
 from ..attributes import frames_of, moves, world_matrix
 from ..settings import season_of
-from ..species.asset_species import asset_of, asset_species, find_asset, name_of
+from ..species.asset_species import PREFIX, asset_of, asset_species, find_asset, name_of
 from ..species.edits import catalog, edited_infos, species_for
 from .ages import Part, classed
 from .fields import read_aged_field, read_field_matrices, stored_ages
@@ -338,14 +338,11 @@ def _unknown(odd: list[tuple[str, str]]) -> str:
     """What is said of objects with the species that nobody has, of the first of these."""
     species = odd[0][1]
     names = listed([name for name, other in odd if other == species])
-    if find_asset(None, species) is not None:
-        return (
-            f'{names}: "{name_of(species)}", which was used as their species, was deleted; undo that, or choose '
-            "another species in the TetFlora tab of the sidebar"
-        )
-    more = len({other for _, other in odd}) - 1
-    return (
-        f'{names}: unknown species "{species}"{f" and {more} more" if more else ""}; choose '
-        "another in the TetFlora tab of the sidebar, or add "
-        f"{species or 'its file'}{'.json' if species else ''} with Load Species"
-    )
+    if species.startswith(PREFIX):
+        gone = "the object or collection that was their species is not used as one; click Use as Species on it again"
+        if find_asset(None, species) is not None:
+            gone = f'"{name_of(species)}", which was used as their species, was deleted; undo that'
+        return f"{names}: {gone}, or choose another species in the TetFlora tab of the sidebar"
+    more, file = len({other for _, other in odd}) - 1, f"{species}.json" if species else "its file"
+    told = f'{names}: unknown species "{species}"{f" and {more} more" if more else ""}; choose another'
+    return f"{told} in the TetFlora tab of the sidebar, or add {file} with Load Species"

@@ -20,6 +20,7 @@ import numpy as np
 from bpy.props import FloatVectorProperty
 from numpy.typing import NDArray
 
+from ...arrays import Floats, linear_of
 from ...errors import NAME, SpeciesError, readable
 from ...files import is_identifier
 from ...species.catalog import FileInfo
@@ -27,8 +28,8 @@ from ..declare import boolean, pointer_to, real, string
 
 #: What identifiers of assets begin with.
 PREFIX = "asset-"
-#: Side of stored pictures in pixels.
-PICTURE_SIDE = 64
+#: Side of stored pictures in pixels, and the fraction of it that the asset fills.
+PICTURE_SIDE, FILLED = 64, 0.92
 
 Datablock = bpy.types.Object | bpy.types.Collection
 
@@ -76,18 +77,11 @@ def find_asset(scene: bpy.types.Scene | None, identifier: str) -> TetFloraAssetS
     return next((entry for entry in entries_of(scene) if entry.identifier == identifier), None)
 
 
-def datablock_of(entry: TetFloraAssetSpecies) -> Datablock | None:
-    """What stands for plants of an asset species; None where it was deleted."""
-    return _living(entry, _references())
-
-
-def _living(entry: TetFloraAssetSpecies, references: Counter[bpy.types.Object]) -> Datablock | None:
-    """What an entry refers to, unless that is an object which the artist has deleted.
-
-    It stays in the file as long as anything refers to it, and be it only these lists.
-    """
+def datablock_of(entry: TetFloraAssetSpecies, references: Counter[bpy.types.Object] | None = None) -> Datablock | None:
+    """What stands for plants of an asset species; None where it was deleted, though these lists keep it in the file."""
     if entry.object is None or entry.id_data.library is not None:
         return entry.object or entry.collection
+    references = _references() if references is None else references
     return entry.object if entry.object.users > references[entry.object] else None
 
 
@@ -101,13 +95,15 @@ def asset_species(scene: bpy.types.Scene | None = None) -> dict[str, TetFloraAss
     references = _references()
     found: dict[str, TetFloraAssetSpecies] = {}
     for entry in entries_of(scene):
-        if _living(entry, references) is not None:
+        if datablock_of(entry, references) is not None:
             found.setdefault(entry.identifier, entry)
     return found
 
 
 def asset_of(datablock: Datablock, scene: bpy.types.Scene | None = None) -> TetFloraAssetSpecies | None:
-    """The species that an object or a collection is."""
+    """The species that an object or a collection is, or the collection that an empty shows."""
+    inner = datablock.instance_collection if getattr(datablock, "type", "") == 'EMPTY' else None
+    datablock = inner or datablock
     return next((entry for entry in entries_of(scene) if datablock in (entry.object, entry.collection)), None)
 
 
@@ -170,3 +166,13 @@ def picture_of(entry: TetFloraAssetSpecies) -> NDArray[np.uint8] | None:
     except (ValueError, zlib.error):
         return None
     return np.frombuffer(pixels, np.uint8).reshape(PICTURE_SIDE, PICTURE_SIDE, 4) if len(pixels) == size else None
+
+
+def wood_color(entry: TetFloraAssetSpecies) -> Floats:
+    """Linear RGB (3,) of the lower half of what bears the crown, by the picture; else of the crown in its shade."""
+    share = 0.5 * (entry.base - entry.height) / max(entry.height, 2.0 * entry.radius)
+    if (picture := picture_of(entry)) is not None:
+        seen = picture[: max(int(PICTURE_SIDE * (0.5 + FILLED * share)), 0)].reshape(-1, 4) / 255.0
+        if cover := seen[:, 3:].sum():
+            return (linear_of(seen[:, :3]) * seen[:, 3:]).sum(axis=0) / cover
+    return 0.45 * np.array(entry.color)

@@ -300,6 +300,7 @@ def results_made_for(scene: bpy.types.Scene) -> dict[str, str]:
         "the day or year": (season, years, stand_years(scene)),
         "the wind": wind,
         "settings": (settings, disc),
+        "the layers": [(one.uid, one.made, one.placed_by, one.shown) for one in scene.tetflora.layers],
     }
     return {name: blake2b(repr(part).encode(), digest_size=8).hexdigest() for name, part in parts.items()}
 

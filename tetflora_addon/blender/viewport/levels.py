@@ -47,6 +47,7 @@ from ..scene.objects import has_contents, is_drop, taking_part
 from ..scene.plants import NoPlantsError, gone_species, read_asset_plants, read_plants
 from ..settings import season_of, years_of
 from ..species import edits
+from ..species.asset_species import find_asset, wood_color
 from ..worker import call_in_thread, steps_in_thread
 from . import state
 from .state import Preview, Running, camera_now, find, of
@@ -146,7 +147,8 @@ def _asset_crowns(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, boxes:
         crown, layer = crown_for(scene, plants.species), depsgraph.view_layer
         seen = plants.matrices[[owner.visible_get(view_layer=layer) for owner in plants.owners]]
         if len(seen):
-            found.append(simple_crowns(seen, (crown.radius, crown.base, crown.height), crown.color, boxes))
+            colors = crown.color, wood_color(find_asset(scene, plants.species))
+            found.append(simple_crowns(seen, (crown.radius, crown.base, crown.height), colors, boxes))
     return found
 
 
