@@ -21,10 +21,11 @@ from devtools import session
 from tests.blender.renders import EEVEE_SAMPLES, few_directions
 from tests.blender.scenes import add_camera, add_plant, depsgraph
 from tetflora_addon.blender.attributes import image_pixels
-from tetflora_addon.blender.export.forest import ExportOrder, export_steps, kinds_of, read_plants, variants_of
+from tetflora_addon.blender.export.forest import ExportOrder, export_steps, kinds_of, variants_of
 from tetflora_addon.blender.results.leaf_objects import materials_of
 from tetflora_addon.blender.results.meshes import write_mesh
 from tetflora_addon.blender.runtime import JobData
+from tetflora_addon.blender.scene.plants import read_plants
 from tetflora_addon.blender.species.edits import species_for
 from tetflora_addon.blender.worker import run_to_end
 
@@ -63,7 +64,7 @@ def _draw_own(species: str) -> None:
     """The finest level of the file's plant as meshes with TetFlora's materials, in place of the plant."""
     scene = bpy.context.scene
     data = JobData("Export Forest", scene, depsgraph())
-    _, seeds = read_plants(data)
+    seeds = read_plants(scene, data.depsgraph)[0]
     shown = run_to_end(variants_of(seeds, run_to_end(kinds_of(data, seeds, 1)), 0, _POLYGONS))
     bpy.data.objects.remove(bpy.data.objects["plant"])  # or it would be refined for the picture
     for part, mesh in shown.variants[0].levels[0].parts:

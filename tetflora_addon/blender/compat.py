@@ -10,6 +10,8 @@ from typing import Any
 import bpy
 import gpu
 
+#: For people to read: nothing depends on it.
+VERSION_TEXT = bpy.app.version_string
 EEVEE_ENGINES = ("BLENDER_EEVEE", "BLENDER_EEVEE_NEXT")
 
 

@@ -17,6 +17,7 @@ import numpy as np
 
 from .. import memory, parallel
 from ..processes import pool
+from .compat import VERSION_TEXT
 from .preferences import CACHE_VARIABLE, ROOT_PACKAGE, preferences
 from .runtime import last_error
 
@@ -54,7 +55,7 @@ def _versions() -> Iterator[str]:
     version = addon_utils.module_bl_info(sys.modules[ROOT_PACKAGE]).get("version", ())
     yield f"TetFlora: {'.'.join(map(str, version)) or 'unknown'}"
     built = bpy.app.build_hash.decode(errors="replace")
-    yield f"Blender: {bpy.app.version_string} ({built}){', in background' if bpy.app.background else ''}"
+    yield f"Blender: {VERSION_TEXT} ({built}){', in background' if bpy.app.background else ''}"
     yield f"Python: {platform.python_version()}, numpy: {np.__version__}"
     yield f"System: {platform.platform()}, {platform.machine()}"
     yield f"Encodings: {sys.getfilesystemencoding()}, language: {bpy.app.translations.locale or 'en_US'}"

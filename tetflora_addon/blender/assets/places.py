@@ -495,11 +495,11 @@ def variants_of(entry: TetFloraAssetSpecies, depsgraph: bpy.types.Depsgraph) -> 
     objects = sorted(entry.collection.objects, key=lambda o: o.name_full)
     # Hiding some leaves them out. But where all are hidden, it is so that they show as plants only.
     objects = [o for o in objects if not o.hide_render] or objects
-    roots = [o for o in objects if o.parent not in objects]
+    held, foot = set(objects), np.eye(4)
+    roots = [o for o in objects if o.parent not in held]
     if len(roots) == 1 < len(objects) and roots[0].type in SURFACE_TYPES and not objects[0].hide_render:
-        foot = np.eye(4)  # a trunk with its leaves is one plant, which stands where the trunk does
         foot[:3, 3] = np.array(entry.collection.instance_offset) - world_matrix(roots[0], depsgraph)[:3, 3]
-        return [(_target(entry.collection), foot)]
+        return [(_target(entry.collection), foot)]  # a trunk with its leaves, which stands where the trunk does
     found = [_as_it_stands(o, depsgraph) for o in objects]
     children = sorted(entry.collection.children, key=lambda c: c.name_full)
     found += [(_target(child), np.eye(4)) for child in children if not child.hide_render]
