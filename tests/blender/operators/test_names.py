@@ -11,6 +11,7 @@ from devtools import names
 pytestmark = pytest.mark.usefixtures("clean_file")
 
 
+@pytest.mark.fine
 def test_names_are_those_of_the_page():
     now, kept = (text.splitlines() for text in (names.page(), names.PAGE.read_text(encoding="utf-8")))
     gone = [line for line in kept if line not in now]
