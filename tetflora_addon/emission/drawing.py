@@ -307,7 +307,8 @@ class _Tile(Canvas):
             self.add_shown(given.occluders)
         for slabs in frontier.slabs(parts, _SLAB * most):
             follow, before = self._following(expected, bool(known)) if np.isfinite(most) else 0.0, self.number
-            times = (follow / max(room - before, 1.0)) ** (1.0 / FEWER)
+            # Rounded: what memory there is, to the byte, shall not change the last bit of each side.
+            times = round((follow / max(room - before, 1.0)) ** (1.0 / FEWER), 9)
             least, times = least or times, max(min(times, UNEVEN * (least or times)), given.finest)
             if known is None and before and _LARGER * times < 1.0:
                 self.asked, self.again = self.asked + follow, False

@@ -271,6 +271,13 @@ def test_what_was_off_screen_comes_back_identical() -> None:
     assert made[0] == made[2] != made[1]
 
 
+def test_room_to_spare_changes_nothing() -> None:
+    """To the last bit: no two moments have the same memory, and frames of a film are made in any order."""
+    flora, _, camera, result = wood()
+    made = [digest(support.drawn(flora, result, camera, 1.2, 0.6, most=most)) for most in (1e7, 16515929.727227628)]
+    assert made[0] == made[1]
+
+
 @cache
 def drawn_with(most: int | None = None) -> tuple:
     """The wood with as many primitives as it has or as somebody allows."""
