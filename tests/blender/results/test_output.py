@@ -35,6 +35,7 @@ def refined(scene):
     return [o for o in scene.objects if o.get("tetflora_kind", "species") != "species"]
 
 
+@pytest.mark.fine
 def test_files_hold_results_only_if_asked(scene, tmp_path):
     path = str(tmp_path / "forest.blend")
     refined(scene)
