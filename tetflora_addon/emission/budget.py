@@ -46,6 +46,8 @@ BYTES_PER_POLYGON = 610
 BYTES_PER_TRIANGLE = 380
 #: Polygons and facets for each pixel that plants cover, about, with facets of a pixel.
 A_PIXEL = 12.0
+#: Steps in which memory counts: a half of one is lost on average.
+MEMORY_STEP = 1.05
 #: Polygons and facets that are never too many with the facets of *Final*, see `relative_side`; and how many times finer
 #: facets are at most.
 PLENTY, FINEST = 2_400_000.0, 5.0
@@ -98,6 +100,8 @@ def fit_to_budget(
         Pixels of the camera for each of the loop's, which may have looked at a smaller image.
     """
     memory = settings.max_memory * 1e9 / BYTES_PER_POLYGON if settings.max_memory else np.inf
+    # In steps: what is free differs by some megabytes from frame to frame, and facets shall not.
+    memory = MEMORY_STEP ** np.floor(np.log(memory) / np.log(MEMORY_STEP)) if 0.0 < memory < np.inf else memory
     most = (1.0 - RESERVE) * min(memory, settings.max_polygons or np.inf)
     detail = Detail(result, camera, settings.facet, settings.leaf_limit)
     if faces is not None:

@@ -278,6 +278,14 @@ def test_room_to_spare_changes_nothing() -> None:
     assert made[0] == made[1]
 
 
+def test_some_megabytes_more_or_less_change_nothing() -> None:
+    """Where memory is the limit: it is never the same for two frames; half of it is still much less."""
+    _, _, camera, result = wood()
+    details = [fit_to_budget(result, camera, RefinementSettings(max_memory=gb)) for gb in (0.02, 0.02003, 0.01)]
+    assert details[0].coarser == details[1].coarser < details[2].coarser
+    assert details[0].most == details[1].most > details[2].most
+
+
 @cache
 def drawn_with(most: int | None = None) -> tuple:
     """The wood with as many primitives as it has or as somebody allows."""
