@@ -203,10 +203,10 @@ def awaits_update(population: bpy.types.PropertyGroup) -> bool:
     """Whether a population has no plants yet, or others than an update would give it; grounds are not read."""
     if not population.uid or population.frozen:
         return False
-    if not population.made or population.placed_by != fingerprint(population):
-        return True
-    home, uid = population.collection, population.uid  # its plants may have been deleted, or moved elsewhere
-    return not (home and home.objects) and all(o.tetflora.population != uid for o in population.id_data.objects)
+    home, uid, every = population.collection, population.uid, population.id_data.objects
+    gone = not (home and home.objects) and len(bpy.data.objects) < 500  # or a draw of panels would take too long
+    outdated = not population.made or population.placed_by != fingerprint(population)
+    return outdated or (gone and all(o.tetflora.population != uid for o in every))
 
 
 def free_seed(scene: bpy.types.Scene, seed: int) -> int:
