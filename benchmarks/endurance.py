@@ -18,12 +18,11 @@ import os
 import tempfile
 import threading
 import time
-from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
 
-from .report import Targets
+from .report import Targets, children
 
 #: Frames for the way there or back, and meters of it.
 LEG, WAY = 10, 4.0
@@ -95,13 +94,13 @@ def _rounds(number: int) -> dict[str, float]:
         bpy.ops.ed.undo_push(message="Refine")
         bpy.ops.ed.undo()
         bpy.ops.ed.redo()
-        used = max(used, len(children()))
+        used = max(used, sum(1 for _ in children()))
         polygons.add(sum(len(mesh.polygons) for mesh in bpy.data.meshes))
         scene = bpy.context.scene
         scene.name = f"round {round % 3}"
         next(obj for obj in scene.objects if obj.tetflora.is_plant).name = f"renamed {round % 5}"
         addon_utils.disable(session.PACKAGE)
-        left["processes"] = max(left["processes"], len(children()))
+        left["processes"] = max(left["processes"], sum(1 for _ in children()))
         end = time.monotonic() + 5.0
         while threading.active_count() > threads and time.monotonic() < end:
             time.sleep(0.01)  # those of `parallel` end when they have seen that they may
@@ -126,16 +125,6 @@ def _rounds(number: int) -> dict[str, float]:
         "threads_left": left["threads"],
         "handles_left": handles[-1] - handles[FIRST_ROUNDS],
     }
-
-
-def children() -> list[int]:
-    """Processes that this one has started and that still run, or wait for it to learn of their end."""
-    own, found = os.getpid(), []
-    for path in Path("/proc").glob("[0-9]*/stat"):
-        with suppress(OSError):  # ended meanwhile
-            if int(path.read_text("ascii", "replace").rpartition(")")[2].split()[1]) == own:
-                found.append(int(path.parent.name))
-    return found
 
 
 def _frames(frames: int) -> dict[str, float]:

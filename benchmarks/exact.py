@@ -21,6 +21,7 @@ too bright in orange and too dark in blue) for each case.
 - ``flip_over_noise``: mean FLIP over the pixels of plants, less that of the truth to itself with another noise seed.
 - ``color``: difference of the mean linear colors of plants, relative to the truth's.
 - ``blobs``: pixels of a million of plants' pixels, of which the mean luma of 3 × 3 is off by more than `OFF`.
+- ``peak_mb``: what all processes together hold at one time, at most.
 - ``facet_px``: mean side (root of the area) in pixels of the faces that the middles of pixels see: of proxies, and of
   twigs that are triangles. Leaves, blossoms and tubes have figures of their own (`sums_of_sides`).
 """
@@ -59,7 +60,7 @@ from tetflora_addon.growth.hashing import child_key, key_of_seed
 
 from . import forest
 from .pictures import color_error, coverage, flip_map, read_picture, render, timed_render
-from .report import ROOT, Targets, cpu_s, forget_peak, peak_mb, records_of, setting, size_of
+from .report import ROOT, Targets, Watch, cpu_s, forget_peak, peak_mb, records_of, setting, size_of
 
 FOLDER = ROOT / "out" / "exact"
 CASES = ("edge", "ridge", "eye", "low")
@@ -542,8 +543,9 @@ def refined(scene: bpy.types.Scene, spec: dict, folder: Path, kept: Path) -> dic
     """What Refine makes, rendered, and how far it is from the truth in a folder."""
     figures: dict[str, Any] = {"planted": build(scene, spec)} | _refined(scene, spec)
     if spec["render"]:
+        watch = Watch()
         figures["render_s"] = timed_render(scene, folder / "refined.png", spec["samples"], 2)
-        figures["peak_render_mb"] = max(peak_mb(), figures["peak_mb"])
+        figures["peak_render_mb"] = max(watch.most, figures["peak_mb"])
         if spec["compare"]:
             figures |= compared(folder, kept, coverage(scene, folder / "coverage.png", COVERAGE_SAMPLES))
     return figures | _sides(scene, folder)
@@ -551,13 +553,12 @@ def refined(scene: bpy.types.Scene, spec: dict, folder: Path, kept: Path) -> dic
 
 def _refined(scene: bpy.types.Scene, spec: dict) -> dict[str, Any]:
     """Refine as renders do; seconds, memory of all processes, and what was made."""
-    forget_peak()
-    begun, processor = time.perf_counter(), cpu_s()
+    watch, begun, processor = Watch(), time.perf_counter(), cpu_s()
     statistics = refine.refine(scene, bpy.context.evaluated_depsgraph_get())
     return {
         "refine_emit_s": time.perf_counter() - begun,
         "refine_emit_cpu_s": cpu_s() - processor,
-        "peak_mb": peak_mb(),
+        "peak_mb": watch.most,
         "stages": {name: round(value, 2) for name, value in statistics.seconds.items()},
         "facet_pixels_said": statistics.facet_pixels,
         **counted(_made(scene), spec["size"]),

@@ -47,7 +47,7 @@ from tetflora_addon.refinement.loop import Refinement, Statistics
 from tetflora_addon.species import catalog
 
 from .pictures import timed_render
-from .report import ROOT, Targets, cpu_s, forget_peak, peak_mb, records_of, setting, size_of
+from .report import ROOT, Targets, Watch, cpu_s, forget_peak, peak_mb, records_of, setting, size_of
 
 #: Left by a run: what each process has measured.
 FOLDER = ROOT / "out" / "forest"
@@ -90,8 +90,6 @@ _OURS = (
     "peak_render_mb",
 )
 _THEIRS = ("build_s", "render_s", "peak_render_mb")
-#: Bytes of a megabyte of `report.peak_mb`, which counts thousands of kibibytes.
-_MEGABYTE = 1024e3
 
 TARGETS: Targets = {
     "refine_emit_s_max": {"max": 20.0},
@@ -315,14 +313,14 @@ def refined(scene: bpy.types.Scene, run_to_end: bool = False) -> dict:
     """
     kept: list[Refinement] = []
     taken: list[tuple[float, str]] = []
-    forget_peak()  # of what planted the wood
+    watch = Watch()
     with watching(kept.append):
         start, processor, every = time.perf_counter(), time.process_time(), cpu_s()
         steps = _timed(refine.refine_steps(scene, bpy.context.evaluated_depsgraph_get()), taken)
         statistics = worker.run_to_end(steps) if run_to_end else worker.run(steps)
         seconds, processor = time.perf_counter() - start, time.process_time() - processor
         every = cpu_s() - every
-    peak = peak_mb()
+    peak = watch.most
     found = left_open(kept.pop()) if kept else {}
     memory.give_back()  # as the job has done, but for what was kept here to be counted
     forget_peak()  # counting made copies
@@ -399,6 +397,7 @@ def rendered(scene: bpy.types.Scene, folder: Path, samples: int) -> dict[str, fl
     The same in processor seconds, which others that run beside it hardly change. With a single sample: render once, for
     the memory.
     """
+    watch = Watch()
     taken = {number: _render_seconds(scene, folder / "picture.png", number) for number in sorted({1, samples})}
     figures = {}
     for place, clock in enumerate(("", "cpu_")):
@@ -411,7 +410,7 @@ def rendered(scene: bpy.types.Scene, folder: Path, samples: int) -> dict[str, fl
             f"render_sample_{clock}s": each,
             f"render_{SAMPLES}_{clock}s": setup + SAMPLES * each,
         }
-    return figures | {"peak_render_mb": peak_mb()}
+    return figures | {"peak_render_mb": watch.most}
 
 
 def _render_seconds(scene: bpy.types.Scene, path: Path, samples: int) -> tuple[float, float]:
@@ -520,7 +519,7 @@ def sums(records: Mapping[tuple[str, str], dict]) -> dict[str, float]:
         "hidden_open_ratio_max": max(one["hidden_open"] for one in woods.values()),
     }
     if limits:
-        used = {f"limit_{n}_gb": one["peak_render_mb"] * _MEGABYTE / (n * 1e9) for n, one in limits.items()}
+        used = {f"limit_{n}_gb": one["peak_render_mb"] / (n * 1e3) for n, one in limits.items()}
         figures |= {"limit_ratio_max": max(used.values()), **used}
     if ("million", "refine") in records:
         one = records["million", "refine"]

@@ -15,14 +15,11 @@ from __future__ import annotations
 import argparse
 import json
 import tempfile
-import threading
-import time
-from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
 
-from .report import Targets, records_of
+from .report import Targets, Watch, records_of
 
 #: Plants of a stand of each species on a square of so many meters, or the name of a biome.
 STANDS = {"birch": 300, "spruce": 200}
@@ -57,25 +54,6 @@ def run(given: argparse.Namespace) -> dict[str, float] | None:
     return found
 
 
-class _Watch:
-    """The largest sum of resident memory of this process and those that it has started."""
-
-    def __init__(self) -> None:
-        self.most = 0.0
-        threading.Thread(target=self._look, daemon=True).start()
-
-    def _look(self) -> None:
-        from .endurance import children
-
-        while True:
-            held = 0
-            for pid in ("self", *children()):
-                with suppress(OSError):  # ended meanwhile
-                    held += int(Path("/proc", str(pid), "statm").read_text("ascii").split()[1])
-            self.most = max(self.most, held * 4096 / 1e6)
-            time.sleep(0.02)
-
-
 def measure(name: str, gigabytes: float) -> dict[str, float]:
     """Refine and render, and try to expand everything; megabytes and their ratio to the limit."""
     import bpy
@@ -90,7 +68,7 @@ def measure(name: str, gigabytes: float) -> dict[str, float]:
     scene.tetflora.max_memory, scene.tetflora.refine_at_render = gigabytes, False
     scene.render.engine, scene.cycles.samples, scene.cycles.use_denoising = 'CYCLES', 1, False
     scene.render.resolution_x, scene.render.resolution_y = SIZE
-    watch = _Watch()
+    watch = Watch()
     statistics = refine.refine(scene, bpy.context.evaluated_depsgraph_get())
     with tempfile.TemporaryDirectory() as folder:
         scene.render.filepath = str(Path(folder) / "picture.png")

@@ -10,12 +10,16 @@ import platform
 import resource
 import subprocess
 import sys
+import threading
+import time
 from collections.abc import Iterator
 from contextlib import suppress
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
 CLEAR_PEAK = Path("/proc/self/clear_refs")
+#: Seconds between two looks at the memory of all processes.
+LOOK = 0.05
 Targets = dict[str, dict[str, float]]
 
 
@@ -37,13 +41,45 @@ def cpu_s() -> float:
 
 
 def _running_children_s() -> Iterator[float]:
-    own, tick = os.getpid(), os.sysconf("SC_CLK_TCK") if hasattr(os, "sysconf") else 1
+    tick = os.sysconf("SC_CLK_TCK") if hasattr(os, "sysconf") else 1
+    for _, fields in children():
+        yield (int(fields[11]) + int(fields[12])) / tick
+
+
+def children() -> Iterator[tuple[int, list[str]]]:
+    """Processes that this one has started and that still run, or wait for it to learn of their end.
+
+    Their numbers, and what the system tells of each: state, parent, …, ticks in programs and in the system.
+    """
     for path in Path("/proc").glob("[0-9]*/stat"):
         with suppress(OSError):  # ended meanwhile
-            # After the name, which may hold anything: state, parent, …, ticks in programs and in the system.
-            fields = path.read_text().rpartition(")")[2].split()
-            if int(fields[1]) == own:
-                yield (int(fields[11]) + int(fields[12])) / tick
+            fields = path.read_text("ascii", "replace").rpartition(")")[2].split()  # a name may hold anything
+            if int(fields[1]) == os.getpid():
+                yield int(path.parent.name), fields
+
+
+class Watch:
+    """The largest sum of resident memory of this process and those that it has started at one time.
+
+    Attributes
+    ----------
+    most : float
+        Megabytes, looked at every `LOOK` seconds; pages that processes share count in each.
+    """
+
+    def __init__(self) -> None:
+        self.most = 0.0
+        threading.Thread(target=self._look, daemon=True).start()
+
+    def _look(self) -> None:
+        page = os.sysconf("SC_PAGE_SIZE")
+        while True:
+            held = 0
+            for pid in ("self", *(pid for pid, _ in children())):
+                with suppress(OSError):
+                    held += int(Path("/proc", str(pid), "statm").read_text("ascii").split()[1])
+            self.most = max(self.most, held * page / 1e6)
+            time.sleep(LOOK)
 
 
 def forget_peak() -> None:
