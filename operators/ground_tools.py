@@ -27,16 +27,9 @@ from .base import NO_VIEWPORT, Tool, counted, in_object_mode, scene_here, select
 
 # Turning and moving the view, which goes on while a tool runs.
 NAVIGATION = {
-    'MIDDLEMOUSE',
-    'WHEELUPMOUSE',
-    'WHEELDOWNMOUSE',
-    'TRACKPADPAN',
-    'TRACKPADZOOM',
-    'MOUSEROTATE',
-    'MOUSESMARTZOOM',
-    'NDOF_MOTION',
-    *(f'NUMPAD_{n}' for n in (*range(10), 'PERIOD', 'PLUS', 'MINUS')),
-}
+    'MIDDLEMOUSE', 'WHEELUPMOUSE', 'WHEELDOWNMOUSE', 'TRACKPADPAN', 'TRACKPADZOOM', 'MOUSEROTATE', 'MOUSESMARTZOOM',
+    'NDOF_MOTION', *(f'NUMPAD_{n}' for n in (*range(10), 'PERIOD', 'PLUS', 'MINUS')),
+}  # fmt: skip
 
 
 class GroundTool(Tool):

@@ -321,16 +321,9 @@ LEAF_ENVELOPES = ("none", "sphere", "cylinder", "cone", "box")
 LEAF_INCLINATIONS = ("branch", "spherical", "planophile", "erectophile", "plagiophile", "extremophile", "uniform")
 """How leaves stand: as the branch has it, or by a distribution of the angle between their normals and its axis."""
 CROWN_PROFILES = (
-    "conical",
-    "spherical",
-    "hemispherical",
-    "cylindrical",
-    "tapered",
-    "flame",
-    "inverse conical",
-    "tend flame",
+    "conical", "spherical", "hemispherical", "cylindrical", "tapered", "flame", "inverse conical", "tend flame",
     "receding",
-)
+)  # fmt: skip
 """Names of the shapes, in the order of their numbers (Weber and Penn, SIGGRAPH 1995, section 4.3), and one more."""
 BARKS = (
     "ridged", "plated", "smooth", "banded", "ringed", "fibrous", "jointed", "netted", "peeling", "scaly",

@@ -5,6 +5,8 @@
 from __future__ import annotations
 
 import hashlib
+import itertools
+import json
 import random
 
 import bpy
@@ -13,10 +15,12 @@ import pytest
 
 from tests.blender.digests import these
 from tests.blender.scenes import add_camera, add_mesh, add_plant, datablocks, depsgraph
+from tetflora_addon import memory
 from tetflora_addon.blender import compat
-from tetflora_addon.blender.job import frame_cache, refine, render
-from tetflora_addon.blender.results.output import result_collections
+from tetflora_addon.blender.job import contents, frame_cache, refine, render
+from tetflora_addon.blender.results.output import megabytes_held, result_collections
 from tetflora_addon.blender.scene.camera import read_camera
+from tetflora_addon.processes import pool
 
 FRAMES = 12
 
@@ -96,6 +100,39 @@ def test_neighboring_frames_share_and_each_is_the_frame_alone(animation, made):
     assert {n: alone(animation, n) for n in order[::2]} == {n: sequence[n] for n in order[::2]}
 
 
+def test_frames_are_alike_where_memory_is_the_limit(animation, made, monkeypatch):
+    """What earlier frames have made is there still, other processes are known to need more, and some bytes are lost."""
+    lost = itertools.count()
+    monkeypatch.setattr(memory, "LEAST", 0.0)
+    monkeypatch.setattr(memory, "resident", lambda: 2e7 + 2e3 * next(lost) + held())
+    monkeypatch.setattr(pool, "share", lambda _limit: 1e5 * (len(made) > 1))
+    animation.tetflora.max_memory = 0.022
+    sequence = {n: at(animation, n) for n in range(1, FRAMES + 1)}
+    assert json.loads(animation.tetflora.statistics)["facet_pixels"] > 1.5 * animation.tetflora.facet
+    for n in (FRAMES, FRAMES // 2):
+        lost = itertools.count()
+        made.clear()
+        contents._left.clear()  # as in another Blender
+        assert alone(animation, n) == sequence[n]
+
+
+def test_results_that_wait_go_where_the_renderer_needs_their_memory(animation, made, monkeypatch):
+    left = [1e9]
+    monkeypatch.setattr(frame_cache, "memory_left", lambda *_: left[0])
+    go(animation, 1)
+    go(animation, FRAMES // 2)
+    assert len(frame_cache._entries) == 2
+    left[0] = 0.0
+    go(animation, FRAMES)
+    assert len(frame_cache._entries) == 1
+    assert made == [1, FRAMES // 2, FRAMES]
+
+
+def held():
+    """Bytes of all results, about."""
+    return 110.0 * sum(len(mesh.polygons) for mesh in bpy.data.meshes)
+
+
 def test_what_is_seen_again_comes_back_without_being_made_again(animation, made):
     first = at(animation, 1)
     go(animation, FRAMES)
@@ -119,7 +156,7 @@ def test_what_was_not_seen_for_longest_goes_first(animation, made, keep_memory):
     sizes = []
     for n in (1, FRAMES // 2, FRAMES):
         go(animation, n)
-        sizes.append(sum(entry.megabytes for entry in frame_cache._entries.values()))
+        sizes.append(megabytes_held('RENDER'))
     render.on_render_end(animation)
     made.clear()
     keep_memory((sizes[-1] - sizes[0] / 2.0) / 1e3)  # room for two of three

@@ -41,6 +41,7 @@ from ..assets.places import Places, Target, digest_of, read_places, read_source_
 from ..preferences import preferences
 from ..results.hiding import hidden_originals, originals_shown
 from ..results.leaf_objects import resolved_species
+from ..results.output import megabytes_held
 from ..results.proxy_kinds import proxy_kind_of
 from ..scene.ages import kind_species
 from ..scene.explicit import Explicit, read_explicit
@@ -50,6 +51,10 @@ from ..scene.objects import read_occluders
 from ..scene.plants import NoPlantsError, read_plants
 from ..settings import check_limits, most_memory, season_of, wind_of, years_of
 from ..worker import steps_in_thread
+
+#: Memory that is left over what was left, from which on it counts as another; and that by scene, limit and picture.
+_STEADY = 1.2
+_left: dict[tuple[int, float, int], float] = {}
 
 
 @dataclass(frozen=True)
@@ -240,6 +245,19 @@ def memory_left(scene: bpy.types.Scene, camera: Camera | None = None) -> float:
     most = most_memory(scene)
     picture = 0 if camera is None else picture_bytes(scene, camera)
     return memory.allowance(most, picture + pool.share(memory.limit(most)))
+
+
+def steady_memory_left(scene: bpy.types.Scene, camera: Camera, purpose: str) -> float:
+    """`memory_left` for results that take the place of all earlier ones of their purpose.
+
+    It stays what it was for the first results of a scene as long as it changes by less than `_STEADY`: a frame of a
+    film is to be that frame alone, although caches grow, and other processes turn out to need more than was thought.
+    """
+    left = memory_left(scene, camera) + 1e6 * megabytes_held(purpose)
+    known = scene.session_uid, most_memory(scene), picture_bytes(scene, camera)
+    if not 1.0 / _STEADY < left / _left.setdefault(known, left) < _STEADY:
+        _left[known] = left
+    return _left[known]
 
 
 def refinement_settings(scene: bpy.types.Scene) -> RefinementSettings:

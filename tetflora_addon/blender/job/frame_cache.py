@@ -25,19 +25,21 @@ from ..materials.snow import has_snow
 from ..preferences import preferences
 from ..results.hiding import hidden_originals, hide_originals, name_of, object_named, show_originals
 from ..results.leaf_objects import brought_materials
-from ..results.output import REPLACED, remove_collection, result_collections
+from ..results.output import MEGABYTES, REPLACED, megabytes_held, remove_collection, result_collections
 from ..results.proxies import shade_again
 from ..scene.ages import kind_species
 from ..scene.camera import read_camera
 from ..settings import season_of, wind_of, years_of
 from ..species.asset_species import asset_species
 from ..species.edits import species_for
-from .contents import SceneContents, load_for, read_scene, settings_from
+from .contents import SceneContents, load_for, memory_left, read_scene, settings_from
 
 _CHOICES = ("proxy_kind", "baked_light", "expand_everything", "asset_detail")
 #: Settings of a scene that results do not depend on.
 _IGNORED = {"statistics", "share_frames", "cell_length", "cell_turn"}
 _IGNORED |= {"refine_at_render", "auto_refine", "follow_viewport"}
+#: Memory that a renderer takes of results, over what these take in Blender (`budget.BYTES_PER_POLYGON`).
+_RENDERED = 4.5
 
 
 @dataclass
@@ -47,7 +49,6 @@ class _Entry:
     scene: int  # its number in this session: scenes of a sequencer are rendered while another one is
     collection: str
     originals: list[tuple[str, str]]
-    megabytes: float
     statistics: str
 
 
@@ -89,21 +90,13 @@ def scene_digest(
     targets = {one.target: "" for one in given.places}
     for target in targets:
         targets[target] = digest_of(target, depsgraph)
-    for part in (
-        camera or read_camera(scene, depsgraph),
-        given.seeds,
-        given.occluders,
-        given.lights,
-        given.sources,
-        explicit,
-        [
-            (targets[p.target], [o.name_full for o in p.owners], p.matrices, p.keys, given.looks[p.owner])
-            for p in given.places
-        ],
-        choices(scene),
-        species,
-        [brought_materials(scene, identifier) for identifier in given.species],
-    ):
+    places = [
+        (targets[p.target], [o.name_full for o in p.owners], p.matrices, p.keys, given.looks[p.owner])
+        for p in given.places
+    ]
+    parts = camera or read_camera(scene, depsgraph), given.seeds, given.occluders, given.lights, given.sources, explicit
+    brought = [brought_materials(scene, identifier) for identifier in given.species]
+    for part in (*parts, places, choices(scene), species, brought):
         add_to_digest(content, part)
     return content.hexdigest()
 
@@ -246,17 +239,22 @@ def recall(scene: bpy.types.Scene, key: str) -> bpy.types.Collection | None:
     return collection
 
 
-def store(scene: bpy.types.Scene, key: str, collection: bpy.types.Collection, megabytes: float) -> None:
-    """Add new results of a scene, and remove the least recently used ones beyond the limit."""
+def store(scene: bpy.types.Scene, key: str, collection: bpy.types.Collection, camera: Camera) -> None:
+    """Add new results of a scene, and remove the least recently used ones beyond the limit.
+
+    Where the renderer of a camera's picture needs their memory, these are all that are not shown.
+    """
     originals = [name_of(o) for o in hidden_originals(scene, 'RENDER')]
-    _entries[key] = _Entry(scene.session_uid, collection.name, originals, megabytes, scene.tetflora.statistics)
+    _entries[key] = _Entry(scene.session_uid, collection.name, originals, scene.tetflora.statistics)
     wind = wind_of(scene)
     # In a wind without a loop no frame returns.
     own = preferences()
     kept = own.kept_memory if own is not None else 1.0
     limit = kept * 1e3 if wind is None or wind.loop > 0.0 else 0.0
+    left = memory_left(scene, camera) / 1e6 - _RENDERED * collection.get(MEGABYTES, 0.0)
+    limit = min(limit, megabytes_held('RENDER') + left)
     for other in _stowed(scene):
-        if sum(entry.megabytes for entry in _entries.values()) <= limit:
+        if megabytes_held('RENDER') <= limit:
             break
         _forget(scene, other)
 

@@ -48,7 +48,7 @@ from ..results.hiding import hide_originals, originals_shown, remove_results
 from ..results.instances import add_cluster, add_cluster_instances, add_instances, add_stand_in, carrier_of
 from ..results.leaf_objects import leaf_objects, materials_of
 from ..results.meshes import AssetMeshes, cluster_mesh_steps, mesh_steps, read_mesh
-from ..results.output import adopt_materials, release_materials, result_collections
+from ..results.output import MEGABYTES, adopt_materials, release_materials, result_collections
 from ..results.proxies import Baking, ProxyWriter, proxy_writer
 from ..results.proxy_kinds import ProxyKind, proxy_kind_of
 from ..runtime import JobData, guarded
@@ -461,6 +461,7 @@ def _replace(run: _Run) -> None:
     remove_results(results.scene, results.purpose, keep=(results.shown, *run.beside))
     release_materials()
     hide_originals(results.scene, results.purpose, run.originals)
+    results.shown[MEGABYTES] = run.statistics.memory_mb
     results.finish()
 
 
@@ -548,8 +549,7 @@ def _refined(run: _Run, disc: float) -> Job[EmissionInput]:
 def _write_refined(run: _Run) -> Job[None]:
     """Refine, and make meshes, instances and proxies; objects that scatter what has taken part are replaced as well."""
     scene, given = run.results.scene, run.given
-    run.form, left = proxy_kind_of(scene), contents.memory_left(scene, run.camera)
-    # What the process holds already and what the image takes count too.
+    run.form, left = proxy_kind_of(scene), contents.steady_memory_left(scene, run.camera, run.results.purpose)
     run.settings = replace(run.settings, max_memory=left / 1e9 if np.isfinite(left) else 0.0)
     if given.sources is not None:
         run.baking = Baking(given.sources, leaves=scene.tetflora.baked_light == 'ALL')

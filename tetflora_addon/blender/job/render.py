@@ -195,7 +195,7 @@ def _make(scene: bpy.types.Scene) -> None:
                 _warn(text, text)
             new = [c for c in result_collections(scene, 'RENDER') if c not in before]
             for collection in new:
-                in_main_thread(partial(frame_cache.store, scene, key, collection, statistics.memory_mb))
+                in_main_thread(partial(frame_cache.store, scene, key, collection, camera))
         in_main_thread(partial(show_in, scene, new, layers))
     in_main_thread(partial(_hide, scene, [key for key, *_ in wanted]))
     if len(scene.view_layers) > 1 or _rendering.outer != scene.session_uid:

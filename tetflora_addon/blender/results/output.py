@@ -28,6 +28,8 @@ STAND_IN = "stand-in"
 SOURCE = "tetflora_source"
 #: Custom property of a result collection: 'VIEW' for the artist's results, 'RENDER' for those of a running render.
 PURPOSE = "tetflora_purpose"
+#: Megabytes that the objects of a result collection take in Blender.
+MEGABYTES = "tetflora_megabytes"
 _KEPT = "tetflora_kept"  # on materials that a file holds although it does not hold the results that use them
 #: Kinds of which a species' materials can be replaced.
 REPLACED = ("leaf", "blossom", "bark")
@@ -201,6 +203,11 @@ def result_collections(scene: bpy.types.Scene, purpose: str | None = None) -> li
         and c.override_library is None
         and not copied(c)
     ]
+
+
+def megabytes_held(purpose: str) -> float:
+    """Megabytes of all results of a purpose, those that wait for later frames included."""
+    return sum(c.get(MEGABYTES, 0.0) for c in bpy.data.collections if c.get(PURPOSE) == purpose)
 
 
 def release_copies(collection: bpy.types.Collection) -> None:
