@@ -23,7 +23,7 @@ export PYTHONPYCACHEPREFIX = $(CURDIR)/out/pycache
 .DEFAULT_GOAL := help
 
 help:
-	@echo 'make demo         a forest of eighty trees: out/demo/{cycles,eevee,top}.png, demo.blend, stats.json'
+	@echo 'make demo         a forest of eighty trees, in some minutes: out/demo/{cycles,eevee,top}.png, demo.blend, stats.json'
 	@echo 'make results      the figures and tables of the paper, made anew: docs/results.md, docs/images, out/paper'
 	@echo 'make test         all tests that need no full Blender, on bpy'
 	@echo 'make quick        the tests that took little time when they were last run, in about a minute'

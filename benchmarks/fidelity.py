@@ -460,8 +460,8 @@ def make_sheet(folder: Path, target: Path) -> None:
     top = 0
     for (labels, cells), height in zip(rows, heights, strict=True):
         for column, (label, cell) in enumerate(zip(labels, cells, strict=True)):
-            draw.text((column * (SHEET_WIDTH + 4) + 2, top + 1), label, fill=_TEXT, font=font)
             if cell is not None:
+                draw.text((column * (SHEET_WIDTH + 4) + 2, top + 1), label, fill=_TEXT, font=font)
                 sheet.paste(cell, (column * (SHEET_WIDTH + 4), top + _LABEL))
         top += height
     target.parent.mkdir(parents=True, exist_ok=True)

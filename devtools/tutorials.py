@@ -95,7 +95,7 @@ def store(out: Path, name: str, parts: tuple[str, ...]) -> None:
     for path in files:
         subprocess.run([sys.executable, "-m", "devtools.tutorials", "--render", str(path)], check=True, cwd=build.ROOT)
     pictures = [str(path.with_suffix(".png")) for path in files]
-    command = ["montage", *pictures, "-geometry", f"{SIZE[0]}x{SIZE[1]}+2+2", "-tile", "2x" if len(parts) > 1 else "1x"]
+    command = ["montage", *pictures, "-geometry", f"{SIZE[0]}x{SIZE[1]}+0+0", "-tile", "2x" if len(parts) > 1 else "1x"]
     subprocess.run([*command, "-strip", "-quality", "84", str(IMAGES / f"tutorial-{name}.jpg")], check=True)
 
 

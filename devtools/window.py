@@ -94,6 +94,7 @@ def run_scripts(blender: str, scripts: dict[Path, Path], timeout: float, resourc
         environment.pop("WAYLAND_DISPLAY", None)
         environment["LIBGL_ALWAYS_SOFTWARE"] = "1"  # a virtual screen has no graphics card
         command = [blender, "--gpu-backend", "opengl", "-p", "0", "0", *map(str, SIZE), "--enable-event-simulate"]
+        command += ["--python-exit-code", "1"]  # if the driver cannot be opened
         command += ["-P", str(DRIVER), "--", *(str(path.resolve()) for pair in scripts.items() for path in pair)]
         with log_path.open("w") as log:
             process = subprocess.Popen(

@@ -166,10 +166,15 @@ def _register_open(cls: Any, picture: str, sections: list[str]) -> Any:
     """Register a copy of a panel that is open; under another name, because Blender remembers what was closed."""
     import bpy
 
-    section = sys.modules[f"{cls.__module__.rpartition('.')[0]}.base"].section
-    sys.modules[cls.__module__].section = lambda layout, title, closed=True, switch=None: section(
-        layout, title, title not in sections, switch
-    )
+    base = sys.modules[f"{cls.__module__.rpartition('.')[0]}.base"]
+    plain = getattr(base.section, "plain", base.section)
+
+    def section(layout: Any, title: str, closed: bool = True, switch: Any = None) -> Any:
+        return plain(layout, title, title not in sections, switch)
+
+    section.plain = plain
+    # Some panels import the function, others its module.
+    base.section = sys.modules[cls.__module__].section = section
     name = f"{cls.__name__}_{picture.replace('-', '_')}"
     place = {"bl_space_type": 'VIEW_3D', "bl_region_type": 'UI', "bl_category": "TetFlora", "bl_context": ""}
     made = type(name, (cls,), {"bl_options": set(), "bl_idname": name, **place})

@@ -13,9 +13,14 @@ import json
 import resource
 import sys
 import time
+from collections.abc import Iterator
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 from devtools import session
+
+if TYPE_CHECKING:
+    from tetflora_addon.jobs import Progress
 
 # Each sample of EEVEE draws all polygons anew, which takes seconds where the processor does it for want of a GPU.
 CYCLES_SAMPLES, EEVEE_SAMPLES = 48, 8
@@ -24,6 +29,20 @@ CYCLES_SAMPLES, EEVEE_SAMPLES = 48, 8
 def say(text: str) -> None:
     """Progress, at once even when the output is a file."""
     print(f"[{time.strftime('%H:%M:%S')}] {text}", flush=True)
+
+
+def follow(steps: Iterator[Progress]) -> Any:
+    """Take all steps and say how far they are, each state once; gives what they return."""
+    said = ""
+    while True:
+        try:
+            progress = next(steps)
+        except StopIteration as stop:
+            return stop.value
+        line = f"{100 * progress.fraction:3.0f} %  {progress.message}"
+        if line != said:
+            say(line)
+        said = line
 
 
 def run(out: Path, width: int) -> dict:
@@ -53,14 +72,7 @@ def run(out: Path, width: int) -> dict:
 
     # The demo times refinement and rendering apart; a plain `blender -b demo.blend -f 1` does both by itself.
     scene.tetflora.refine_at_render = False
-    steps = refine.refine_steps(scene, bpy.context.evaluated_depsgraph_get())
-    while True:
-        try:
-            progress = next(steps)
-        except StopIteration as stop:
-            statistics = stop.value
-            break
-        say(f"{100 * progress.fraction:3.0f} %  {progress.message}")
+    statistics = follow(refine.refine_steps(scene, bpy.context.evaluated_depsgraph_get()))
     peak_mb = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / (1e6 if sys.platform == "darwin" else 1e3)
     seconds = dict(statistics.seconds)
     for engine, name in (('CYCLES', "cycles"), (compat.eevee_engine(), "eevee")):
@@ -85,6 +97,7 @@ def run(out: Path, width: int) -> dict:
         f"{statistics.polygons_meshed:,} were made ({100 * fraction:.1f} %) "
         f"and {statistics.tetrahedra_proxy:,} tetrahedra are drawn as proxies"
     )
+    say(f"Images and figures are in {out}")
     return stats
 
 

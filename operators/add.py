@@ -93,8 +93,7 @@ class TETFLORA_OT_use_as_skeleton(
 
 
 class TETFLORA_OT_first_forest(Reporting, Operator, label="First Forest", needs=(in_object_mode,)):
-    """Create a small complete scene with ground, about ninety plants of four species, camera, sun and sky, ready for
-    Refine and F12.
+    """Create a small complete scene: a path through trees, ferns and ground cover, with a camera, the sun and a sky.
 
     Existing objects remain: if the scene is not empty, a new scene is added.
     """
@@ -117,9 +116,8 @@ class TETFLORA_OT_first_forest(Reporting, Operator, label="First Forest", needs=
         for area in (area for area in areas if area.type == 'VIEW_3D'):
             area.spaces.active.region_3d.view_perspective = 'CAMERA'
         note = f" ({note})" if note else ""
-        return self.done(
-            f"Created a forest of {plants} plants{note}. Press F12 to render it, click Refine to see it here"
-        )
+        made = f"Created a forest of {plants} plants and ground cover{note}"
+        return self.done(f"{made}. Press F12 to render it, click Refine to see it here")
 
 
 # What is not given comes from the panel's settings: defaults do not matter here.

@@ -84,18 +84,20 @@ class TETFLORA_OT_refine(base.ModalJob, Operator, label="Refine", needs=(base.in
 
 def _made(scene: bpy.types.Scene, statistics: Statistics) -> str:
     """What was refined, and what of it was made."""
-    seconds = f"in {sum(statistics.seconds.values()):.1f} s"
     instances = base.counted(statistics.instances, "instance")
     if not (statistics.passes or statistics.plants) and statistics.instances_whole == statistics.instances > 0:
         why = "" if scene.tetflora.expand_everything else ", as the renderer draws these at the least cost"
         return f"{instances} of assets stay the originals{why}"
     what = [base.counted(statistics.plants, "plant")] if statistics.plants or not statistics.instances else []
     what += [f"{instances} of assets"] if statistics.instances else []
-    made = f"{statistics.polygons_meshed:,} of {statistics.polygons_full:,} polygons"
+    polygons = statistics.polygons_meshed + statistics.polygons_proxy  # as the panel and Max Polygons count
+    made = f"{polygons:,} polygons"
     if statistics.instances:
-        made = f"{base.counted(statistics.instances_whole, 'original')}, "
-        made += f"{base.counted(statistics.instances_clusters, 'cluster')}, {statistics.polygons_meshed:,} polygons"
-    return f"{' and '.join(what)}: {made}, {base.counted(statistics.tetrahedra_proxy, 'proxy')} {seconds}"
+        whole, clusters = statistics.instances_whole, statistics.instances_clusters
+        made = f"{base.counted(whole, 'original')}, {base.counted(clusters, 'cluster')}, {made}"
+    elif polygons < statistics.polygons_full:
+        made += f" instead of {statistics.polygons_full:,}"
+    return f"{' and '.join(what)}: {made} in {sum(statistics.seconds.values()):.1f} s"
 
 
 def _unread_world(scene: bpy.types.Scene) -> str:

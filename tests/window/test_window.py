@@ -41,6 +41,14 @@ def test_sidebar(shown: list[dict], pictures: Path, colors: Callable[[Path], int
     assert colors(pictures / "sidebar" / "sidebar.png") > 200
 
 
+def test_a_driver_that_cannot_be_opened_ends_blender_at_once(
+    full_blender: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(window, "DRIVER", tmp_path / "driver.py")
+    result = window.run_in_window(full_blender, HERE / "sidebar_steps.py", tmp_path / "out", 60)
+    assert "ended (code 1)" in result["error"]
+
+
 def test_an_error_in_a_script_is_reported_and_the_next_is_run(shown: list[dict]) -> None:
     assert not shown[0]["ok"]
     assert "raised on purpose" in shown[0]["error"]

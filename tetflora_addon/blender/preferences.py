@@ -70,7 +70,7 @@ class TetFloraPreferences(bpy.types.AddonPreferences):
     threads: integer(
         "Threads",
         "Number of processor cores that refine plants. 0 follows the scene's render settings: Threads in the "
-        "Performance panel. Results are the same with any number; each core takes some memory of its own",
+        "Performance panel. Results are the same unless memory is short; each core takes some of it",
         **within(0, 16, 64),
     )
     use_cache: boolean(

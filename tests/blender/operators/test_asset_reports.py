@@ -58,12 +58,25 @@ def test_refined_instances_are_counted_beside_plants(scatter, capfd):
     assert f"{whole} original" in out and f"{clusters} cluster" in out
 
 
-def test_statistics_of_plants_alone_say_nothing_of_instances():
+def test_statistics_of_plants_alone_say_nothing_of_instances(capfd):
     add_camera(location=(0.0, -20.0, 2.0))
     add_plant(species="bush")
     scene().render.resolution_percentage = 5
     assert bpy.ops.tetflora.refine() == {'FINISHED'}
-    assert "Instances" not in dict(outputs.rows_of(scene().tetflora.statistics))
+    text = scene().tetflora.statistics
+    assert "Instances" not in dict(outputs.rows_of(text))
+    figures = json.loads(text)
+    made = figures["polygons_meshed"] + figures["polygons_proxy"]
+    assert made > figures["polygons_meshed"]
+    assert f"1 plant: {made:,} polygons instead of {figures['polygons_full']:,} in " in capfd.readouterr().out
+
+
+def test_reports_count_polygons_as_the_panel_does(scatter, capfd):
+    scene().tetflora.asset_detail = 'REFINE'
+    add_plant(species="bush")
+    assert bpy.ops.tetflora.refine() == {'FINISHED'}
+    figures = json.loads(scene().tetflora.statistics)
+    assert f", {figures['polygons_meshed'] + figures['polygons_proxy']:,} polygons in " in capfd.readouterr().out
 
 
 def test_what_is_wrong_with_an_asset_is_told_by_refine_and_by_renders(scatter, capfd):

@@ -42,11 +42,12 @@ def _startup():
     return bpy.context.scene
 
 
-def test_an_empty_scene_becomes_a_forest():
+def test_an_empty_scene_becomes_a_forest(capfd):
     before = bpy.context.scene
     scene = _plant()
     assert scene == before
     plants = _plants(scene)
+    assert f"Created a forest of {len(plants)} plants and ground cover. Press F12" in capfd.readouterr().out
     assert 60 <= len(plants) <= 100
     assert 3 <= len({o.tetflora.species for o in plants}) <= 4
     places = np.array([o.location for o in plants])
