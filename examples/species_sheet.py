@@ -14,7 +14,6 @@ import numpy as np
 from tetflora_addon.blender.job import contents, plant_mesh
 from tetflora_addon.blender.materials import materials
 from tetflora_addon.blender.results import leaf_objects, meshes
-from tetflora_addon.compiled.sizes import crown_of
 from tetflora_addon.growth import growth
 from tetflora_addon.jobs import run_to_end
 from tetflora_addon.proxies import microsurfaces
@@ -26,7 +25,7 @@ from . import stage
 from .paper.pictures import save_sheet
 from .studio import render_cells
 
-COLUMNS, SIZE, OPENED_SIZE = 8, (236, 290), (380, 400)
+COLUMNS, SIZE, OPENED_SIZE = 7, (236, 290), (380, 400)
 SEED = 11
 #: The plant that is opened, and how wide one facet of its deferred parts is, meters.
 OPENED, FACET = "beech", 0.3
@@ -39,9 +38,9 @@ def _points(mesh: bpy.types.Mesh) -> np.ndarray:
 
 
 def plant_cell(
-    identifier: str, name: str, polygons: dict[str, int], seed: int = SEED, age: float = 0.0
+    identifier: str, name: str, made: dict[str, tuple[int, float]], seed: int = SEED, age: float = 0.0
 ) -> Callable[[], tuple[np.ndarray, str]]:
-    """Puts one plant of a species into the scene, as a mesh, and its number of polygons into ``polygons``."""
+    """Puts one plant of a species into the scene, as a mesh, and its polygons and height in meters into ``made``."""
 
     def build() -> tuple[np.ndarray, str]:
         scene = bpy.context.scene
@@ -49,8 +48,9 @@ def plant_cell(
         bpy.context.view_layer.update()
         steps = plant_mesh.make_plant_mesh_steps(scene, bpy.context.evaluated_depsgraph_get(), [empty])
         (plant,) = run_to_end(steps)
-        points, polygons[identifier] = _points(plant.data), len(plant.data.polygons)
-        high = points[:, 2].max()
+        points = _points(plant.data)
+        high = float(points[:, 2].max())
+        made[identifier] = len(plant.data.polygons), high
         return points, f"{name}, {high:.2g} m" if high >= 1.0 else f"{name}, {100.0 * high:.0f} cm"
 
     return build
@@ -91,12 +91,13 @@ def render_sheet(path: Path, samples: int = 32, identifiers: Sequence[str] | Non
 
     They stand from the highest to the lowest.
     """
-    known, polygons = catalog.list_species(), {}
-    order = sorted(identifiers or known, key=lambda one: -crown_of(catalog.load_species(one)).height)
+    known, made = catalog.list_species(), {}
     with tempfile.TemporaryDirectory() as folder:
-        cells = [plant_cell(one, known[one].name, polygons) for one in order]
-        save_sheet(render_cells(cells, Path(folder), SIZE, samples), COLUMNS, path)
-    return polygons
+        cells = [plant_cell(one, known[one].name, made) for one in identifiers or known]
+        rendered = zip(made.items(), render_cells(cells, Path(folder), SIZE, samples), strict=True)
+        ordered = sorted(rendered, key=lambda one: -one[0][1][1])
+        save_sheet([cell for _, cell in ordered], COLUMNS, path)
+    return {identifier: polygons for identifier, (polygons, _) in made.items()}
 
 
 def render_opening(path: Path, samples: int = 32) -> None:
