@@ -19,19 +19,7 @@ from typing import Any, Generic, Self, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import (
-    Arrays,
-    Chunks,
-    Floats,
-    Floats32,
-    Growing,
-    Integers,
-    Integers32,
-    Mask,
-    column,
-    nested,
-    spread,
-)
+from ..arrays import Arrays, Chunks, Floats, Floats32, Growing, Integers, Integers32, Mask, column, nested, spread
 from ..assets.asset import AssetTable, Instances
 from ..camera.camera import Camera
 from ..compiled.flora import Flora, placed_samples
