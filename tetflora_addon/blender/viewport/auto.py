@@ -295,11 +295,11 @@ def _view_layer(scene: bpy.types.Scene) -> bpy.types.ViewLayer:
 
 def _plants(_scene: bpy.types.Scene, layer: bpy.types.ViewLayer) -> object:
     """Which plants and fields there are, and who sees them."""
-    seen, every = set(shown_objects(layer)), layer.objects
-    return sorted((o.name_full, o in seen, o.hide_render) for o in (*plants_of(every), *fields_of(every)))
+    seen, every = {o.name_full for o in shown_objects(layer)}, layer.objects
+    return sorted((name := o.name_full, name in seen, o.hide_render) for o in (*plants_of(every), *fields_of(every)))
 
 
-_outlook = Outlook(_plants)
+_outlook = Outlook(lambda scene, layer: _plants(scene, layer) if has_results(scene) else None)
 
 
 def results_made_for(scene: bpy.types.Scene, ask: Callable = _plants) -> dict[str, str]:
