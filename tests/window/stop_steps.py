@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Esc in the middle of what reads and writes files and adds biomes; tests/window/test_stop.py judges it."""
+"""Esc in the middle of what reads and writes files and adds biomes, and H; tests/window/test_stop.py judges it."""
 
 import sys
 from pathlib import Path
@@ -13,8 +13,9 @@ from devtools.aliases import INSTALLED, alias
 
 alias(INSTALLED)
 from tests import places_files  # noqa: E402  (found only now)
-from tests.blender.scenes import add_plant, datablocks  # noqa: E402
+from tests.blender.scenes import add_plant, datablocks, select  # noqa: E402
 from tetflora_addon.blender import compat  # noqa: E402
+from tetflora_addon.blender.viewport import auto  # noqa: E402
 
 #: Imports, by kinds of files.
 KINDS = "grid", "csv", "big_tiff", "outlines"
@@ -27,6 +28,7 @@ def steps(ui):
         add_plant(f"p{n}", seed=n, location=(3.0 * n, 0.0, 0.0))
     ui.move(*ui.center())
     yield 0.5
+    yield from hide(ui, scene)
     calls = {kind: places_files.write(ui.out_dir, kind) for kind in KINDS}
     calls = {
         kind: (name, {"filepath": str(path), "chosen": True, "new_origin": True})
@@ -57,6 +59,28 @@ def steps(ui):
             now = state()
             ui.values[key] = [what for what in before if before[what] != now[what]]
             ui.values[key] += [path.name for path in sorted(ui.out_dir.iterdir()) if path not in files]
+
+
+def hide(ui, scene):
+    """H, Refine, Alt H; what results say after each."""
+    select(bpy.data.objects["p1"])
+    yield from ui.show_sidebar("TetFlora")
+    ui.press('H')
+    yield from ui.until(lambda: not bpy.data.objects["p1"].visible_get(), 20, "hidden plant")
+    with ui.override():
+        bpy.ops.tetflora.refine()
+    yield 3.0
+    said = [auto.changed_since(scene)]
+    ui.move(*ui.center())
+    ui.press('H', alt=True)
+    yield from ui.until(lambda: bpy.data.objects["p1"].visible_get(), 20, "plant that is shown again")
+    yield 3.0
+    said.append(auto.changed_since(scene))
+    yield from ui.picture("shown_again")
+    with ui.override():
+        bpy.ops.tetflora.refine()
+        bpy.ops.tetflora.clear()
+    ui.values["said"] = said
 
 
 def hold(cls, number):
