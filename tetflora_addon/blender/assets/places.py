@@ -22,7 +22,6 @@ from typing import Any, Self
 
 import bpy
 import numpy as np
-from mathutils import Matrix
 from numpy.typing import NDArray
 
 from ...arrays import Floats, Keys, Mask
@@ -168,6 +167,7 @@ def _evaluated(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> bpy.typ
 
 
 Trail = tuple[bpy.types.ID, ...]
+Place = tuple[tuple[float, ...], ...]  # of a matrix (4, 4), which can be compared
 
 
 class _Parts:
@@ -264,7 +264,7 @@ class Target:
     geometry: bpy.types.GeometrySet | None  # without a datablock: what nodes instance
     owner: bpy.types.Object | None  # whose nodes, or the root of a family
     name: str  # for messages
-    family: tuple[tuple[bpy.types.Object, Matrix], ...] = ()  # instead of both: originals, and places from their root
+    family: tuple[tuple[bpy.types.Object, Place], ...] = ()  # instead of both: originals, and places from their root
 
     @property
     def shown(self) -> bpy.types.Object | bpy.types.Collection | bpy.types.GeometrySet:
@@ -281,7 +281,7 @@ class Target:
         """
         walk = _Parts(self.name, depsgraph)
         for shown, place in self.family or ((self.shown, np.eye(4)),):
-            walk.take(shown, np.array(place, np.float64)[None])
+            walk.take(shown, np.array([place]))
         return list(walk.parts.values()), walk.warnings
 
     def meshes(self, depsgraph: bpy.types.Depsgraph) -> Iterator[tuple[AssetPart, bpy.types.Mesh, Slots]]:
@@ -529,7 +529,7 @@ def _as_it_stands(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph, parts: 
     if len(parts) < 2:
         return _target(obj), turned
     back = np.linalg.pinv(here)
-    family = tuple((one, Matrix(back @ world_matrix(one, depsgraph)).freeze()) for one in parts)
+    family = tuple((one, tuple(map(tuple, (back @ world_matrix(one, depsgraph)).tolist()))) for one in parts)
     return Target(None, None, obj, obj.name, family), turned
 
 

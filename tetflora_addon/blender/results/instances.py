@@ -17,7 +17,6 @@ from typing import Any
 
 import bpy
 import numpy as np
-from mathutils import Matrix
 from numpy.typing import NDArray
 
 from ...arrays import Floats, Integers, Integers32
@@ -143,8 +142,8 @@ def carrier_of(results: Results, target: Any) -> Source:
     return results.shared(("carrier", target), lambda: make(results, target.name, target.geometry or target.family))
 
 
-def _family(results: Results, name: str, family: Sequence[tuple[bpy.types.Object, Matrix]]) -> bpy.types.Collection:
-    made = [_held(results, f"{name} {n}", one, np.array(at)[None], np.array([n])) for n, (one, at) in enumerate(family)]
+def _family(results: Results, name: str, family: Sequence[tuple[bpy.types.Object, Any]]) -> bpy.types.Collection:
+    made = [_held(results, f"{name} {n}", one, np.array([at]), np.array([n])) for n, (one, at) in enumerate(family)]
     return _collection(results, name, made)
 
 
