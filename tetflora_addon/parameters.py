@@ -274,11 +274,7 @@ class FileReader:
         return values
 
     def read(
-        self,
-        kind: type[Declared],
-        data: Any,
-        where: str,
-        readers: Mapping[str, Callable[[Any, str], Any]] | None = None,
+        self, kind: type[Declared], data: Any, where: str, readers: Mapping[str, Callable[..., Any]] | None = None
     ) -> Declared:
         """An object of a dataclass: fields that have keys, and those that have a reader of their own.
 

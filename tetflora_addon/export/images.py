@@ -25,7 +25,7 @@ from .levels import PlantLevel, corner_triangles
 #: is of its color in coarser levels of the texture.
 TEXELS, MARGIN = 256, 8
 #: Columns and rows of cells: of leaves, and of wood, whose coordinates repeat along a branch.
-LEAVES, WOOD = (4, 4), (4, 1)
+_LEAVES, _WOOD = (4, 4), (4, 1)
 _ROUNDS, _SAMPLE = 8, 50_000
 
 
@@ -52,11 +52,12 @@ class Palette:
         return np.stack([u, v], axis=1).astype(np.float32)
 
 
-def palette_of(meshes: Sequence[MeshBuffers], grid: tuple[int, int]) -> Palette:
+def palette_of(meshes: Sequence[MeshBuffers], wood: bool) -> Palette:
     """Colors that are nearest to those of all faces of meshes, by clusters, and where their coordinates lie."""
     every = np.concatenate([mesh.attributes["tf_color"][1] for mesh in meshes])
     uv = np.concatenate([mesh.attributes["UVMap"][1] for mesh in meshes])
     some = every[:: max(len(every) // _SAMPLE, 1)]
+    grid = _WOOD if wood else _LEAVES
     number = grid[0] * grid[1]
     bright = np.argsort(some.sum(axis=1), kind="stable")
     colors = some[bright[np.linspace(0, len(some) - 1, number).astype(int)]]
@@ -65,7 +66,7 @@ def palette_of(meshes: Sequence[MeshBuffers], grid: tuple[int, int]) -> Palette:
         count = np.bincount(cell, minlength=number)[:, None]
         sums = np.stack([np.bincount(cell, column, number) for column in some.T], axis=1)
         colors = np.where(count > 0, sums / np.maximum(count, 1), colors).astype(np.float32)
-    if grid[1] == 1:  # once around a branch, and a meter along it
+    if wood:  # once around a branch, and a meter along it
         return Palette(colors, np.zeros(2), np.ones(2), grid)
     low = uv.min(axis=0).astype(np.float64)
     return Palette(colors, low, np.maximum(uv.max(axis=0) - low, 1e-6), grid)

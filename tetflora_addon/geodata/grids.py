@@ -110,12 +110,7 @@ def _step(values: Floats, name: str, what: str) -> float:
 
 
 def _gridded(
-    places: Floats,
-    steps: tuple[float, float],
-    name: str,
-    system: System,
-    scale: float = 1.0,
-    nothing: float | None = None,
+    places: Floats, steps: Sequence[float], name: str, system: System, scale: float = 1.0, nothing: float | None = None
 ) -> Raster:
     """A raster of heights at places (n, 3), of which each step is so many units of the system."""
     low = places[:, :2].min(axis=0)

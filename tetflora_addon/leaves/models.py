@@ -17,18 +17,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..arrays import (
-    GOLDEN_ANGLE,
-    Floats,
-    Floats32,
-    Integers,
-    Integers32,
-    connected,
-    cross,
-    perpendicular,
-    spiral,
-    spread,
-)
+from ..arrays import GOLDEN_ANGLE, Floats, Floats32, Integers, Integers32, connected, perpendicular, spiral, spread
 from ..errors import SpeciesError
 from ..files import beside
 from ..parameters import limited
@@ -446,7 +435,7 @@ def spined(model: LeafModel, spines: Spines, part: Integers) -> tuple[LeafModel,
     across = perpendicular(along)
     root = place[owner]
     needles = _pyramids(
-        root, root + length[:, None] * along, across, cross(along, across), spines.thickness / 2, _EDGES
+        root, root + length[:, None] * along, across, np.cross(along, across), spines.thickness / 2, _EDGES
     )
     made, tints = model, [np.ones((model.polygons, 3))]
     for points, color in ((felt, _FELT), (needles, _SPINE)):

@@ -323,7 +323,7 @@ def _wood_of_subplants(flora: Flora, subplants: Branches, rules: FacetRules) -> 
 
 def _wood_of_pieces(flora: Flora, pieces: Pieces, rules: FacetRules) -> Facets:
     none, wood = np.zeros(len(pieces)), wood_areas(flora, pieces) / 2
-    made = _along(flora, pieces, wood, rules.wood_side**2, none, False)
+    made = _along(flora, pieces, wood, rules.wood_side**2, none, False, None)
     owner, t, velocity = made.owner, made.t, None
     part = (t - pieces.t0[owner]) / np.maximum(pieces.t1 - pieces.t0, 1e-12)[owner]
     span = (pieces.end - pieces.start)[owner]
@@ -355,13 +355,7 @@ def _carried(flora: Flora, subplants: Branches, made: FacetSites) -> Floats | No
 
 
 def _along(
-    flora: Flora,
-    pieces: Pieces,
-    area: Floats,
-    facet: Floats,
-    start: Floats,
-    leafy: bool,
-    explicit: Floats | None = None,
+    flora: Flora, pieces: Pieces, area: Floats, facet: Floats, start: Floats, leafy: bool, explicit: Floats | None
 ) -> FacetSites:
     """Facets of pieces, and their places along the branch; see `facet_sites`.
 

@@ -9,9 +9,10 @@ import numpy as np
 import pytest
 
 from tests.blender.assets.scatters import Nodes, read, scene, species, tree
-from tests.blender.scenes import add_mesh, add_plant, depsgraph, select
+from tests.blender.scenes import add_camera, add_mesh, add_plant, depsgraph, select
 from tetflora_addon.blender.assets.marks import stop_using
 from tetflora_addon.blender.job import contents
+from tetflora_addon.blender.job.refine import clear, refine
 from tetflora_addon.blender.scene import plants
 from tetflora_addon.blender.scene.fields import write_field
 from tetflora_addon.blender.scene.objects import has_contents
@@ -108,6 +109,56 @@ def test_a_trunk_with_its_leaves_in_a_collection_is_one_plant_that_stands_where_
     places = [part.matrices[0] for part in found.target.parts(depsgraph())[0]]
     stand = sorted(tuple((found.matrices[4] @ place)[:3, 3]) for place in places)
     assert stand == [pytest.approx((4.0, 0.0, 0.0)), pytest.approx((4.0, 0.0, 3.0))]
+
+
+def trees_with_leaves(hidden=False):
+    """Two trunks with leaves, apart from each other, in a collection."""
+    trunks = [tree(f"trunk {n}") for n in range(2)]
+    for n, trunk in enumerate(trunks):
+        leaves = tree(f"leaves {n}")
+        leaves.parent = trunk
+        trunk.location, leaves.location.z = (60.0 * (1 + n), 0.0, 0.0), 3.0 + n
+        trunk.hide_render = leaves.hide_render = hidden
+    return trunks
+
+
+@pytest.mark.parametrize("hidden", [False, True])
+def test_each_trunk_with_its_leaves_in_a_collection_is_a_variant_that_stands_where_the_trunk_does(hidden):
+    trunks = trees_with_leaves(hidden)
+    own = species(trunks[0].users_collection[0], variants=True)
+    assert find_asset(scene(), own).height == pytest.approx(4.5)
+    for seed in range(20):
+        add_plant(f"plant {seed}", species=own, seed=seed, location=(seed, 0.0, 0.0))
+    found = read()
+    assert sorted(one.target.name for one in found) == ["trunk 0", "trunk 1"] and sum(map(len, found)) == 20
+    for one in found:
+        places = [part.matrices for part in one.target.parts(depsgraph())[0]]
+        heights = [3.0 + trunks.index(bpy.data.objects[one.target.name])]
+        stand = sorted(tuple((one.matrices[0] @ place)[:3, 3]) for part in places for place in part)
+        foot = one.matrices[0, :3, 3]
+        assert stand == [pytest.approx(foot), pytest.approx(foot + [0.0, 0.0, heights[0]])]
+
+
+@pytest.mark.parametrize("plain", [True, False])
+def test_results_show_trunks_with_their_leaves(plain):
+    trunks = trees_with_leaves(hidden=True)
+    own = species(trunks[0].users_collection[0], variants=True)
+    add_camera(location=(8.0, -60.0, 2.0))
+    for seed in range(6):
+        add_plant(f"plant {seed}", species=own, seed=seed, location=(3.0 * seed, 0.0, 0.0))
+    scene().tetflora.asset_detail = 'AUTO' if plain else 'REFINE'
+    statistics = refine(scene(), depsgraph())
+    assert statistics.plants + statistics.instances == 6
+    tops = [
+        max((inst.matrix_world @ v.co).z for v in inst.object.data.vertices)
+        for inst in depsgraph().object_instances
+        if inst.is_instance and inst.object.type == 'MESH' and len(inst.object.data.polygons)
+    ]
+    assert {round(top, 3) for top in tops} == {1.0, 4.0, 5.0} and len(tops) == 12
+    before = {obj.name for obj in trunks}
+    clear(scene())
+    assert before <= set(bpy.data.objects.keys()) and not [o for o in bpy.data.objects if o.get("tetflora_made")]
+    assert not [c for c in bpy.data.collections if c.get("tetflora_made")]
 
 
 def test_trees_of_a_common_parent_are_variants_each():

@@ -435,8 +435,10 @@ def test_nothing_is_left_of_what_fails(monkeypatch):
     for step in steps:
         if step.message.startswith("Floor"):
             break
+    assert scene().render.use_lock_interface  # a stand has grown
     steps.close()
     assert (datablocks(), len(scene().tetflora.species_edits)) == before and not biomes()
+    assert not scene().render.use_lock_interface
 
 
 def test_the_button_makes_land_where_there_is_none(monkeypatch):

@@ -204,14 +204,22 @@ def test_variants_beyond_max_memory_are_refused(blender, tmp_path, monkeypatch):
     assert export(tmp_path / "f.obj", variants=2, polygons=300).variants == 4
 
 
-def test_closing_the_steps_leaves_no_half_file(blender, tmp_path, pxr):
+@pytest.mark.parametrize("ending", [".usdc", ".glb", ".obj"])
+@pytest.mark.parametrize("until", ["variants", "texture", "plants of", "writing", ""])
+@pytest.mark.parametrize("bake", [False, True])
+def test_closing_the_steps_leaves_no_half_file_and_nothing_in_the_scene(blender, tmp_path, ending, until, bake):
+    """Nor does an export that ends."""
+    if ending == ".usdc" and compat.usd() is None:
+        pytest.skip("this Blender has no USD")
     field()
-    steps = export_steps(scene(), depsgraph(), ExportOrder(tmp_path / "f.usdc", 1, polygons=3000, bake=False))
+    before = datablocks(), [s.name for s in bpy.data.scenes], scene().render.use_lock_interface
+    steps = export_steps(scene(), depsgraph(), ExportOrder(tmp_path / f"f{ending}", 1, polygons=3000, bake=bake))
     for step in steps:
-        if "writing" in step.message:
+        if until and until in step.message:
             break
     steps.close()
-    assert list(tmp_path.iterdir()) == []
+    assert list(tmp_path.iterdir()) == [] or not until
+    assert (datablocks(), [s.name for s in bpy.data.scenes], scene().render.use_lock_interface) == before
 
 
 def test_a_folder_that_is_not_there_is_named(blender, tmp_path):

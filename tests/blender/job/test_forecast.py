@@ -192,6 +192,24 @@ def test_settings_and_camera_show_at_once():
     assert _forecast().primitives < before.primitives
 
 
+def test_an_estimate_makes_nothing_in_the_file_where_the_camera_moves():
+    camera = add_camera()
+    _wood(50)
+    scene = bpy.context.scene
+    before = _forecast()
+    for frame in (0, 2):
+        camera.location.x = frame
+        camera.keyframe_insert("location", frame=frame)
+    scene.frame_set(1)
+    camera.location.x = 0.0
+    used = []
+    for scene.render.use_motion_blur in (False, True):
+        first = bpy.data.texts.new("number").session_uid
+        assert _forecast().primitives == pytest.approx(before.primitives, rel=0.1)
+        used.append(bpy.data.texts.new("number").session_uid - first)
+    assert used[0] == used[1]
+
+
 def test_the_text_says_that_it_is_an_estimate(monkeypatch):
     add_camera()
     _wood(500)

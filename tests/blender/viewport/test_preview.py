@@ -389,13 +389,41 @@ def test_results_say_that_a_layer_was_hidden_or_has_other_plants():
     bpy.ops.tetflora.refine()
     layer = scene.tetflora.layers[0]
     layer.shown = False
-    assert auto.changed_since(scene) == ["the layers"]
+    assert auto.changed_since(scene) == ["the layers", "the plants"]
     layer.shown = True
     assert auto.changed_since(scene) == []
     bpy.ops.tetflora.update_layers(which='ACTIVE', reroll=True)
-    assert auto.changed_since(scene) == ["the layers"]
+    assert "the layers" in auto.changed_since(scene)
     bpy.ops.tetflora.refine()
     assert auto.changed_since(scene) == []
+
+
+@pytest.mark.parametrize("how", ["eye", "monitor", "camera", "collection", "deleted", "another"])
+def test_results_say_that_plants_were_hidden_shown_deleted_or_added(how):
+    scene, _, plants = scene_of_plants(3)
+    apart = bpy.data.collections.new("apart")
+    scene.collection.children.link(apart)
+    apart.objects.link(plants[0])
+    scene.collection.objects.unlink(plants[0])
+    bpy.ops.tetflora.refine()
+    assert auto.changed_since(scene) == []
+    if how == "eye":
+        plants[0].hide_set(True)
+    elif how in {"monitor", "camera"}:
+        setattr(plants[0], "hide_viewport" if how == "monitor" else "hide_render", True)
+    elif how == "collection":
+        bpy.context.view_layer.layer_collection.children["apart"].hide_viewport = True
+    elif how == "deleted":
+        bpy.data.objects.remove(plants[0])
+    else:
+        add_plant("another")
+    bpy.context.view_layer.update()
+    assert auto.changed_since(scene) == ["the plants"]
+    bpy.ops.tetflora.refine()
+    assert auto.changed_since(scene) == []
+    if how == "eye":
+        plants[0].hide_set(False)
+        assert auto.changed_since(scene) == ["the plants"]
 
 
 def test_results_say_what_has_changed_since_they_were_made():

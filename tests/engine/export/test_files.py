@@ -26,7 +26,6 @@ from tetflora_addon.export.forest import (
 )
 from tetflora_addon.export.gltf import write_gltf
 from tetflora_addon.export.images import (
-    LEAVES,
     TEXELS,
     Palette,
     atlas,
@@ -150,7 +149,7 @@ def test_obj_has_each_level_and_a_table_of_places(forest, tmp_path):
 def test_leaves_find_their_color_in_the_atlas(forest):
     level = forest.variants[0].levels[0]
     leaf = next(mesh for part, mesh in level.parts if part == "leaf")
-    palette = palette_of([leaf], LEAVES)
+    palette = palette_of([leaf], False)
     shown = outline(palette, leaf)
     assert 0.2 < shown.mean() < 0.9
     texels = atlas(palette, np.ones((TEXELS, TEXELS, 3), np.float32))

@@ -13,7 +13,7 @@ tree itself. All places of an asset are computed at once, as arrays.
 """
 
 import hashlib
-from collections.abc import Generator, Iterator
+from collections.abc import Generator, Iterator, Sequence
 from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass, field, replace
 from functools import cache
@@ -167,6 +167,7 @@ def _evaluated(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> bpy.typ
 
 
 Trail = tuple[bpy.types.ID, ...]
+Place = tuple[tuple[float, ...], ...]  # of a matrix (4, 4), which can be compared
 
 
 class _Parts:
@@ -261,8 +262,9 @@ class Target:
     #: instances of it show it: its objects as they stand, from its offset.
     datablock: bpy.types.Object | bpy.types.Collection | None
     geometry: bpy.types.GeometrySet | None  # without a datablock: what nodes instance
-    owner: bpy.types.Object | None  # whose nodes
+    owner: bpy.types.Object | None  # whose nodes, or the root of a family
     name: str  # for messages
+    family: tuple[tuple[bpy.types.Object, Place], ...] = ()  # instead of both: originals, and places from their root
 
     @property
     def shown(self) -> bpy.types.Object | bpy.types.Collection | bpy.types.GeometrySet:
@@ -278,7 +280,8 @@ class Target:
             Something instances itself; the message names it.
         """
         walk = _Parts(self.name, depsgraph)
-        walk.take(self.shown, np.eye(4)[None])
+        for shown, place in self.family or ((self.shown, np.eye(4)),):
+            walk.take(shown, np.array([place]))
         return list(walk.parts.values()), walk.warnings
 
     def meshes(self, depsgraph: bpy.types.Depsgraph) -> Iterator[tuple[AssetPart, bpy.types.Mesh, Slots]]:
@@ -500,7 +503,15 @@ def variants_of(entry: TetFloraAssetSpecies, depsgraph: bpy.types.Depsgraph) -> 
     if len(roots) == 1 < len(objects) and roots[0].type in SURFACE_TYPES and not objects[0].hide_render:
         foot[:3, 3] = np.array(entry.collection.instance_offset) - world_matrix(roots[0], depsgraph)[:3, 3]
         return [(_target(entry.collection), foot)]  # a trunk with its leaves, which stands where the trunk does
-    found = [_as_it_stands(o, depsgraph) for o in objects]
+    if len(roots) == 1 and roots[0].type not in SURFACE_TYPES:
+        held -= {*roots}  # an empty that holds all trees
+    trees: dict[bpy.types.Object, list[bpy.types.Object]] = {}
+    for top in objects:
+        part = top
+        while top.parent in held:
+            top = top.parent
+        trees.setdefault(top, []).append(part)
+    found = [_as_it_stands(trunk, depsgraph, parts) for trunk, parts in trees.items()]
     children = sorted(entry.collection.children, key=lambda c: c.name_full)
     found += [(_target(child), np.eye(4)) for child in children if not child.hide_render]
     found = [variant for variant in found if any(variant[0].meshes(depsgraph))]
@@ -511,10 +522,15 @@ def variants_of(entry: TetFloraAssetSpecies, depsgraph: bpy.types.Depsgraph) -> 
     return found
 
 
-def _as_it_stands(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Variant:
-    turned = np.eye(4)
-    turned[:3, :3] = world_matrix(obj, depsgraph)[:3, :3]
-    return _target(obj), turned
+def _as_it_stands(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph, parts: Sequence = ()) -> Variant:
+    """An object, with all parts that hang on it where there are some."""
+    here, turned = world_matrix(obj, depsgraph).astype(np.float64), np.eye(4)
+    turned[:3, :3] = here[:3, :3]
+    if len(parts) < 2:
+        return _target(obj), turned
+    back = np.linalg.pinv(here)
+    family = tuple((one, tuple(map(tuple, (back @ world_matrix(one, depsgraph)).tolist()))) for one in parts)
+    return Target(None, None, obj, obj.name, family), turned
 
 
 def _by_variant(plants: AssetPlants, variants: list[Variant]) -> list[Places]:

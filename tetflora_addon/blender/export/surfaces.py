@@ -16,20 +16,7 @@ import numpy as np
 from ...arrays import Floats, Floats32
 from ...buffers import MeshBuffers
 from ...export.forest import BakedSurface, Variant, identifiers, leaf_roughness
-from ...export.images import (
-    LEAVES,
-    TEXELS,
-    WOOD,
-    Palette,
-    atlas,
-    halved,
-    in_atlas,
-    outline,
-    palette_of,
-    png,
-    tiled,
-    within,
-)
+from ...export.images import TEXELS, Palette, atlas, halved, in_atlas, outline, palette_of, png, tiled, within
 from ...export.levels import PlantLevel, corner_triangles, with_area
 from ...export.opaque import Sides, opaque, sides_of
 from ...jobs import Job, Progress
@@ -42,6 +29,7 @@ from ..materials.node_values import luminance
 from ..materials.nodes import is_ours
 from ..results.leaf_objects import materials_of
 from ..results.meshes import UV_MAP
+from ..results.output import remove_unused
 from ..species.edits import species_for
 
 _BARK = 0.9  # roughness, where it has not been baked
@@ -88,7 +76,8 @@ def with_surfaces(
     bake : bool
         Whether veins, bark and relief are baked; otherwise, textures have colors and outlines only.
     """
-    variants = list(_even(_on_trunks(scene, variants) if bake else variants))
+    with _forgotten():
+        variants = list(_even(_on_trunks(scene, variants) if bake else variants))
     looks = _looks(variants)
     found: dict[tuple[str, str], BakedSurface] = {}
     for number, look in enumerate(looks):
@@ -172,11 +161,22 @@ def _looks(variants: Sequence[Variant]) -> list[_Look]:
                 parts.setdefault((variant.species, part), []).append(mesh)
     names = identifiers([f"{species}_{part}" for species, part in parts])
     return [
-        _Look(name, species, part, tuple(meshes), palette_of(meshes, WOOD if part == "bark" else LEAVES))
+        _Look(name, species, part, tuple(meshes), palette_of(meshes, part == "bark"))
         for name, ((species, part), meshes) in zip(names, parts.items(), strict=True)
     ]
 
 
+@contextmanager
+def _forgotten() -> Iterator[None]:
+    """Where materials of TetFlora's are made that nothing else uses, they are gone afterward."""
+    before = {*bpy.data.materials, *bpy.data.node_groups}
+    try:
+        yield
+    finally:
+        remove_unused({*bpy.data.materials, *bpy.data.node_groups} - before)
+
+
+@_forgotten()
 def _surface(scene: bpy.types.Scene, look: _Look, folder: Path, textures: str, bake: bool) -> BakedSurface:
     is_bark = look.part == "bark"
     gloss = 0.0 if is_bark else GLOSS * (1.0 - look.mean("tf_dull"))

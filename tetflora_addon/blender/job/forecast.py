@@ -56,7 +56,7 @@ def forecast(scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer) -> Estimat
         return None
     try:
         check_settings(scene)
-        camera = read_camera(scene, depsgraph)
+        camera = read_camera(scene, depsgraph, blurred=False)
     except TetFloraError:
         return None
     used = (memory.resident() or 0) + picture_bytes(scene, camera)

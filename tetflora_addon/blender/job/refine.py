@@ -189,12 +189,7 @@ def _kites(run: _Run, target: int) -> Maker:
 
 
 def _write_clusters(
-    run: _Run,
-    target: int,
-    cluster: Integers,
-    instance: Integers32,
-    ids: Integers32,
-    maker: Callable[[_Run, int], Maker],
+    run: _Run, target: int, cluster: Integers, instance: Integers, ids: Integers32, maker: Callable[[_Run, int], Maker]
 ) -> Job[None]:
     """Meshes of the clusters of one asset, each once, and instances of them."""
     results, bound, make, kites = run.results, run.bound, maker(run, target), maker is _kites

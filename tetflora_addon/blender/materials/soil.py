@@ -31,18 +31,12 @@ def is_soil(material: bpy.types.Material | None) -> bool:
 
 
 def lay_soil(
-    name: str,
-    grounds: Sequence[bpy.types.Object],
-    colors: Floats,
-    green: Floats,
-    tint: Floats,
-    low: Floats,
-    cell: float,
+    name: str, grounds: Sequence[bpy.types.Object], earth: Floats, green: Floats, tint: Floats, low: Floats, cell: float
 ) -> list[str]:
     """Give grounds a soil, see `soil_material`, of square cells, meters; names of those that keep the artist's own."""
     fits = [obj for obj in grounds if may_have_soil(obj)]
     before = next((slot.material for obj in fits for slot in obj.material_slots if is_soil(slot.material)), None)
-    material = soil_material(name, colors, green, tint, low, cell * np.array(green.shape[::-1]), before)
+    material = soil_material(name, earth, green, tint, low, cell * np.array(green.shape[::-1]), before)
     for obj in fits:
         if obj.material_slots:
             obj.material_slots[0].material = material

@@ -219,10 +219,11 @@ def remove_layer(scene: bpy.types.Scene, index: int, keep_plants: bool = False) 
 
 @contextmanager
 def restored(scene: bpy.types.Scene) -> Iterator[None]:
-    """Where what is done ends early, forget new layers, what was added to mixtures, and species that were made."""
+    """Where what is done ends early, forget new layers and species, and what was set for them."""
     group = scene.tetflora
     before = {layer.uid: (len(layer.mix), layer.density, layer.seed) for layer in group.layers}
     active, species = group.layers_index, {edit.identifier for edit in group.species_edits}
+    locked = scene.render.use_lock_interface
     try:
         yield
     except BaseException:  # an error, or Esc
@@ -237,7 +238,7 @@ def restored(scene: bpy.types.Scene) -> Iterator[None]:
             while len(layer.mix) > number:
                 layer.mix.remove(len(layer.mix) - 1)
         if is_there(scene):
-            group.layers_index = active
+            group.layers_index, scene.render.use_lock_interface = active, locked
             for identifier in [e.identifier for e in group.species_edits if e.identifier not in species]:
                 revert_species(identifier)
         raise

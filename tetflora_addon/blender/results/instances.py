@@ -19,7 +19,7 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
-from ...arrays import Floats, Integers32
+from ...arrays import Floats, Integers, Integers32
 from ..attributes import write
 from ..compat import set_node_input
 from ..main_thread import in_main_thread
@@ -134,11 +134,17 @@ def add_cluster(
 
 
 def carrier_of(results: Results, target: Any) -> Source:
-    """Something to instance for a target whose geometry is no object's: an object with a copy, made once for a result.
+    """Something to instance for a target that is no datablock: an object with a copy, made once for a result.
 
-    A collection of such objects where the geometry is more than one mesh; its instances are instances there too.
+    A collection of such objects where it is more than one mesh; its instances are instances there too.
     """
-    return results.shared(("carrier", target), lambda: _carrier(results, target.name, target.geometry))
+    make = _family if target.geometry is None else _carrier
+    return results.shared(("carrier", target), lambda: make(results, target.name, target.geometry or target.family))
+
+
+def _family(results: Results, name: str, family: Sequence[tuple[bpy.types.Object, Any]]) -> bpy.types.Collection:
+    made = [_held(results, f"{name} {n}", one, np.array([at]), np.array([n])) for n, (one, at) in enumerate(family)]
+    return _collection(results, name, made)
 
 
 def _carrier(results: Results, name: str, geometry: bpy.types.GeometrySet) -> Source:
@@ -167,14 +173,20 @@ def _nested(results: Results, name: str, geometry: bpy.types.GeometrySet) -> lis
     for inner, rows in references_of(geometry):
         known = isinstance(inner, bpy.types.Object | bpy.types.Collection)
         source = inner.original if known else _carrier(results, name, inner)
-        own = results.name_for(f"{name} {len(made) + 1}")
-        made.append(_instancer(own, source, rows.columns.transpose(0, 2, 1), rows.number.astype(np.int32)))
-        results.hold(made[-1], own)
+        made.append(_held(results, f"{name} {len(made) + 1}", source, rows.columns.transpose(0, 2, 1), rows.number))
+    return made
+
+
+def _held(
+    results: Results, name: str, source: Source, matrices: NDArray[np.floating], ids: Integers
+) -> bpy.types.Object:
+    made = _instancer(own := results.name_for(name), source, matrices, ids)
+    results.hold(made, own)
     return made
 
 
 def _instancer(
-    name: str, source: Source, matrices: NDArray[np.floating], ids: Integers32, pick: Integers32 | None = None
+    name: str, source: Source, matrices: NDArray[np.floating], ids: Integers, pick: Integers32 | None = None
 ) -> bpy.types.Object:
     """An object in no collection whose nodes show instances of a source, or of objects picked from a collection."""
     kind = 'COLLECTION' if isinstance(source, bpy.types.Collection) else 'OBJECT'

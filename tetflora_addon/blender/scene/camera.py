@@ -21,7 +21,9 @@ _NARROW_FISHEYE = math.pi / 4.0
 _LEAST_HALF = 0.1
 
 
-def read_camera(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, region_only: bool = False) -> Camera:
+def read_camera(
+    scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, region_only: bool = False, blurred: bool = True
+) -> Camera:
     """The active camera as it is evaluated now.
 
     ``camera.view_frame`` already knows about lens shift, sensor fit and pixel aspect. A scaled or sheared camera is
@@ -33,6 +35,8 @@ def read_camera(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, region_o
     ----------
     region_only : bool
         Of the render region, if there is one, instead of the whole image. Panoramas are always whole.
+    blurred : bool
+        With its movement while the shutter is open, for which a scene is made for a moment.
 
     Raises
     ------
@@ -91,8 +95,8 @@ def read_camera(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, region_o
             f'The camera "{name}" has zero scale, a scale above 100,000, or an invalid position; '
             "clear them with Alt S and Alt G"
         )
-    others = (*_while_open(scene, depsgraph, camera, window), *_stereo_views(scene, camera, depsgraph))
-    return replace(camera, shutter=others)
+    moved = _while_open(scene, depsgraph, camera, window) if blurred else ()
+    return replace(camera, shutter=(*moved, *_stereo_views(scene, camera, depsgraph)))
 
 
 def _region(

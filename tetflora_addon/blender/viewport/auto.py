@@ -13,7 +13,7 @@ simple shapes stand for them until there is a first look; else they stay until a
 """
 
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from hashlib import blake2b
@@ -31,15 +31,16 @@ from ..job import refine
 from ..job.frame_cache import choices, scene_digest
 from ..main_thread import in_main_thread
 from ..materials.nodes import is_ours, is_own
-from ..placing.plant_objects import prepare_scene
+from ..placing.plant_objects import plants_of, prepare_scene
 from ..properties import auto_refine_switched
 from ..results.collection import has_results
 from ..results.hiding import remove_results
 from ..results.leaf_objects import leaf_objects
 from ..results.output import PURPOSE, remove_collection, result_collections
-from ..runtime import GoneError, Part, call_off, call_soon, handlers, in_order, listening, redraw, with_uid
+from ..runtime import GoneError, Outlook, Part, call_off, call_soon, handlers, in_order, listening, redraw, with_uid
 from ..scene.camera import is_rendered, view_camera, viewport_of, viewports
-from ..scene.fields import stand_years
+from ..scene.fields import fields_of, stand_years
+from ..scene.looks import shown_objects
 from ..settings import season_of, wind_of, years_of
 from .state import camera_now, find
 
@@ -292,8 +293,17 @@ def _view_layer(scene: bpy.types.Scene) -> bpy.types.ViewLayer:
     return shown or scene.view_layers[0]
 
 
-def results_made_for(scene: bpy.types.Scene) -> dict[str, str]:
-    """What decides on results and is cheap to ask, as texts that differ, by what to call it."""
+def _plants(_scene: bpy.types.Scene, layer: bpy.types.ViewLayer) -> object:
+    """Which plants and fields there are, and who sees them."""
+    seen, every = {o.name_full for o in shown_objects(layer)}, layer.objects
+    return sorted((name := o.name_full, name in seen, o.hide_render) for o in (*plants_of(every), *fields_of(every)))
+
+
+_outlook = Outlook(lambda scene, layer: _plants(scene, layer) if has_results(scene) else None)
+
+
+def results_made_for(scene: bpy.types.Scene, ask: Callable = _plants) -> dict[str, str]:
+    """What decides on results and is cheap to ask, as texts that differ, by what to call it; None is not known."""
     *settings, wind, season, years, disc = choices(scene)
     parts = {
         "the camera": camera_now(scene),
@@ -301,8 +311,9 @@ def results_made_for(scene: bpy.types.Scene) -> dict[str, str]:
         "the wind": wind,
         "settings": (settings, disc),
         "the layers": [(one.uid, one.made, one.placed_by, one.shown) for one in scene.tetflora.layers],
+        "the plants": ask(scene, _view_layer(scene)),
     }
-    return {name: blake2b(repr(part).encode(), digest_size=8).hexdigest() for name, part in parts.items()}
+    return {k: blake2b(repr(part).encode(), digest_size=8).hexdigest() for k, part in parts.items() if part is not None}
 
 
 def note_results(scene: bpy.types.Scene, made_for: dict[str, str]) -> None:
@@ -314,7 +325,8 @@ def note_results(scene: bpy.types.Scene, made_for: dict[str, str]) -> None:
 def changed_since(scene: bpy.types.Scene) -> list[str]:
     """What has changed since the results of a scene were made; nothing where these do not say for what."""
     before = next((c[_MADE_FOR].to_dict() for c in result_collections(scene, 'VIEW') if _MADE_FOR in c), {})
-    return [name for name, text in results_made_for(scene).items() if before.get(name, text) != text] if before else []
+    now = results_made_for(scene, _outlook.of) if before else {}
+    return [name for name, text in now.items() if before.get(name, text) != text]
 
 
 _known: dict[int, str] = {}  # settings of scenes as they were at the last change
@@ -412,4 +424,4 @@ _HANDLERS = handlers(
     save_pre=before_save,
 )
 _FIRST = Part(lambda: call_soon(watch, _LOOK) if not bpy.app.background else None, lambda: None)
-register, unregister = in_order(listening(_switched, auto_refine_switched), _HANDLERS, _FIRST, end=on_load)
+register, unregister = in_order(listening(_switched, auto_refine_switched), _HANDLERS, _outlook, _FIRST, end=on_load)
