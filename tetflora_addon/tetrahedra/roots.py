@@ -324,16 +324,8 @@ def _divide_cubes(tree: TetrahedralTree, nodes: Integers, corners: Floats, side:
     zyx, y_first = tree.divide(below, yz).T  # y_first: y ≥ z
     yxz, yzx = tree.divide(y_first, zx).T  # yzx: z ≥ x
     # The further one walks along an axis first, the larger is the coordinate along it.
-    pieces = (
-        (z_first, (2, 0, 1)),
-        (z_second, (0, 2, 1)),
-        (z_third, (0, 1, 2)),
-        (zyx, (2, 1, 0)),
-        (yxz, (1, 0, 2)),
-        (yzx, (1, 2, 0)),
-    )
-    steps = np.eye(3)
-    for terminals, path in pieces:
+    paths, steps = ((2, 0, 1), (0, 2, 1), (0, 1, 2), (2, 1, 0), (1, 0, 2), (1, 2, 0)), np.eye(3)
+    for terminals, path in zip((z_first, z_second, z_third, zyx, yxz, yzx), paths, strict=True):
         way = np.concatenate([np.zeros((1, 3)), np.cumsum(steps[list(path)], axis=0)])
         if np.linalg.det(steps[list(path)]) < 0.0:
             way = way[[1, 0, 2, 3]]

@@ -53,13 +53,8 @@ YEAR, PLANT = "tf_year", "tf_plant"
 #: Where an object has the year at which its history is shown.
 YEAR_PATH = "tetflora.stand_year"
 #: All of them with their types, in the order in which they are written.
-SIZE_ATTRIBUTES = {
-    **dict.fromkeys(NUMBERS, 'FLOAT'),
-    OFFSET: 'FLOAT_VECTOR',
-    FIT: 'FLOAT_VECTOR',
-    YEAR: 'FLOAT',
-    PLANT: 'INT',
-}
+SIZE_ATTRIBUTES = dict.fromkeys(NUMBERS, 'FLOAT')
+SIZE_ATTRIBUTES |= {OFFSET: 'FLOAT_VECTOR', FIT: 'FLOAT_VECTOR', YEAR: 'FLOAT', PLANT: 'INT'}
 _MOST_FIT, _MOST_OFFSET = 10.0, 10.0
 _STEADY = np.cos(np.radians(30.0))  # trunks that turn further from one record to the next have fallen
 
