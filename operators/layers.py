@@ -81,7 +81,22 @@ def tell_layers(
 Updated = tuple[list[PlacedPlants | growing.GrownStand | int], list[str], list[str]]
 
 
-class TETFLORA_OT_update_layers(ModalJob, Operator, label="Update", needs=_ACTIVE):
+class _InParts(ModalJob):
+    """Mix-in for jobs whose parts stay once they are done, as `cancelled` says then."""
+
+    def modal(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+        result = {'CANCELLED'}
+        try:
+            result = super().modal(context, event)
+        finally:
+            # What was done so far can be undone. Not in `cancel`: Blender calls that also as it loads files and quits.
+            stays = result == {'CANCELLED'} and self.cancelled != ModalJob.cancelled
+            if stays and bpy.ops.ed.undo_push.poll():
+                bpy.ops.ed.undo_push(message=self.bl_label)
+        return result
+
+
+class TETFLORA_OT_update_layers(_InParts, Operator, label="Update", needs=_ACTIVE):
     """Grow layers again by their settings.
 
     Plants that you moved, changed or deleted are replaced too, except where you erased with the brush; plants of other
@@ -109,16 +124,6 @@ class TETFLORA_OT_update_layers(ModalJob, Operator, label="Update", needs=_ACTIV
         if properties.which == 'WOOD':
             return "Give the active layer the slim, bare-stemmed trees of a dense stand, or open-grown ones again"
         return cls.bl_description
-
-    def modal(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
-        result = {'CANCELLED'}
-        try:
-            result = super().modal(context, event)
-        finally:
-            # What was done so far can be undone. Not in `cancel`: Blender calls that also as it loads files and quits.
-            if result == {'CANCELLED'} and bpy.ops.ed.undo_push.poll():
-                bpy.ops.ed.undo_push(message=self.bl_label)
-        return result
 
     def steps(self, context: bpy.types.Context) -> Job[Updated]:
         scene, depsgraph = context.scene, context.evaluated_depsgraph_get()
@@ -373,7 +378,7 @@ class TETFLORA_OT_add_biome(ModalJob, Operator, label="Add Biome", needs=(in_obj
         return tell_layers(self, f'"{result.name}": ', numbers, result.bare, result.kept, more)
 
 
-class TETFLORA_OT_ground_cover(ModalJob, Operator, label="Ground Cover", needs=(in_object_mode, scatter_active)):
+class TETFLORA_OT_ground_cover(_InParts, Operator, label="Ground Cover", needs=(in_object_mode, scatter_active)):
     """Cover the ground under the active layer with what grows in the light there and with what its species shed.
 
     The cover is a layer of its own; use again to renew it after changes above.
@@ -385,6 +390,7 @@ class TETFLORA_OT_ground_cover(ModalJob, Operator, label="Ground Cover", needs=(
     def steps(self, context: bpy.types.Context) -> Job[cover.CoverResult]:
         scene, depsgraph = context.scene, context.evaluated_depsgraph_get()
         made = yield from cover.cover_steps(scene, depsgraph, cover.covered_population(scene), self.soil)
+        self.cancelled = "Stopped; the cover stays, without fallen leaves"
         if self.fallen and scene.tetflora.year.enabled:
             yield from cover.strew_steps(scene, depsgraph, cover.covered_population(scene))
         return made

@@ -21,6 +21,7 @@ from .base import NO_CAMERA, Reporting, in_object_mode
 #: Extent of a viewport's longer side at distance 1, times its focal length in millimeters.
 _VIEWPORT = 72.0
 _OURS = "tetflora_daylight"  # on the sun and the world that Daylight made
+_STARTUP_LAMP = 4.07625, 1.00545, 5.90386  # where Blender's startup file has its lamp
 _LENS = 28.0  # millimeters, of a camera that is made
 _TILT = radians(32.0)  # from above
 _SUMMER = 196.0  # day of the year without seasons
@@ -173,7 +174,18 @@ class TETFLORA_OT_daylight(Reporting, Operator, label="Daylight"):
             kept.append(f'the world "{scene.world.name}"')
         stay = "stay as they are" if len(kept) > 1 else "stays as it is"
         rest = f"; {' and '.join(kept)} {stay}" if kept else ""
+        lamp = scene.objects.get("Light")
+        if lamp is not None and not lamp.hide_render and _is_startup_lamp(lamp):
+            lamp.hide_viewport = lamp.hide_render = True
+            rest += "; the default light is hidden"
         return self.done(f"The sun stands {np.degrees(height):.0f}° high{rest}")
+
+
+def _is_startup_lamp(obj: bpy.types.Object) -> bool:
+    """Whether it is the lamp that Blender starts with, as it was."""
+    if obj.type != 'LIGHT' or obj.data.type != 'POINT' or obj.animation_data or obj.data.animation_data:
+        return False
+    return obj.data.energy == 1000.0 and (obj.matrix_basis.translation - Vector(_STARTUP_LAMP)).length < 1e-3
 
 
 def sun_direction(scene: bpy.types.Scene, hour: float) -> tuple[Vector, float]:

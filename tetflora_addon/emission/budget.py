@@ -35,6 +35,7 @@ from ..refinement.settings import RefinementSettings
 from ..subplants.pieces import expand
 from ..subplants.rings import BUD_RINGS, bud_sides, finer, round_up_to
 from ..subplants.tubes import tube_faces
+from . import drawing
 from .coverage import Coverage
 from .drawing import HIDDEN, HIDDEN_A_PIXEL, HIDDEN_LEAVES, LIT_LEAVES, NEVER_TOO_MANY, OUTSIDE_A_PIXEL, SHADOW, TILE
 from .frontier import DETAIL, FEWER
@@ -269,7 +270,7 @@ class Estimate:
     primitives: float  # polygons and facets
     seconds: float
     memory: float  # bytes of the whole process with the result, and rendering it
-    limited: bool  # whether a limit of the settings makes plants coarser
+    limit: str  # the setting that makes plants coarser; empty where none does
 
 
 def estimate(
@@ -302,13 +303,14 @@ def estimate(
     if everything:
         made = whole @ parts.number
         memory += BYTES_PER_TRIANGLE * float(made[1])
-        return Estimate(plants, float(made[0]), seconds + float(SECONDS_EXPANDED @ made), memory, False)
+        return Estimate(plants, float(made[0]), seconds + float(SECONDS_EXPANDED @ made), memory, "")
     wanted, opened = _numbers(stand, camera, settings, parts, plant, whole[0])
-    made = min(wanted, settings.max_polygons or np.inf, allowed / BYTES_PER_POLYGON)
+    most, limit = min((settings.max_polygons or np.inf, "Max Polygons"), (allowed / BYTES_PER_POLYGON, "Max Memory"))
+    made = min(wanted, (1.0 - RESERVE) * drawing.FULL * most)
     seconds += SECONDS_MADE * made + float(SECONDS_OPENED @ opened) * made / max(wanted, 1.0)
     busy = min(max(processes, 1) / max(camera.width // TILE, 1), 1.0)
     memory += (BYTES_PER_POLYGON + busy * BYTES_IN_TILE) * made
-    return Estimate(plants, made, seconds, memory, wanted > made)
+    return Estimate(plants, made, seconds, memory, limit if wanted > made else "")
 
 
 def _numbers(

@@ -68,7 +68,7 @@ LARGEST_OUTSIDE, _LEAST_OUTSIDE = 3.0, 0.5
 #: Parts outside that are drawn at a time.
 _OUTSIDE_BATCH = 20_000
 #: Fraction of what a tile may have that is for what is seen; beyond, all that is left counts as hidden.
-_FULL = 0.85
+FULL = 0.85
 #: Layers of all that a tile draws, were they drawn at random: pixels stay open with the probability exp(-_LAYERS), 4.1
 #: to 5.4 layers for birches and spruces. What was expected counts as this part of them.
 _LAYERS, _EXPECTED = 5.0, 0.5
@@ -250,7 +250,7 @@ def _drawn_tile(given: Drawing, item: _Item) -> list[Block | Parts | Shown]:
     """All that is drawn of one tile, or of parts that are out of view."""
     number, columns, parts, share = item
     most = share * given.most
-    expected, known = _FULL * most, None
+    expected, known = FULL * most, None
     for _ in range(_TRIES):
         tile = _Tile(given, columns)
         if columns is None:  # parts out of view, a share of all of them
@@ -302,7 +302,7 @@ class _Tile(Canvas):
 
         So many are expected to be asked for, or known. Where they turn out to be far fewer, it stops once.
         """
-        given, frontier, room, least = self.given, self.frontier, _FULL * most, 0.0
+        given, frontier, room, least = self.given, self.frontier, FULL * most, 0.0
         if len(given.occluders):
             self.add_shown(given.occluders)
         for slabs in frontier.slabs(parts, _SLAB * most):

@@ -224,13 +224,9 @@ FACE_FRACTION = 0.5
 
 #: Directions and upward directions of the six faces in camera space (x right, y up, z back).
 _FACES = (
-    ((0, 0, -1), (0, 1, 0)),
-    ((1, 0, 0), (0, 1, 0)),
-    ((0, 0, 1), (0, 1, 0)),
-    ((-1, 0, 0), (0, 1, 0)),
-    ((0, 1, 0), (0, 0, 1)),
-    ((0, -1, 0), (0, 0, -1)),
-)
+    ((0, 0, -1), (0, 1, 0)), ((1, 0, 0), (0, 1, 0)), ((0, 0, 1), (0, 1, 0)), ((-1, 0, 0), (0, 1, 0)),
+    ((0, 1, 0), (0, 0, 1)), ((0, -1, 0), (0, 0, -1)),
+)  # fmt: skip
 
 
 def face_cameras(camera: Camera, side: int) -> list[Camera]:

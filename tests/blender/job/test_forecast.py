@@ -183,13 +183,26 @@ def test_settings_and_camera_show_at_once():
     assert _forecast().primitives <= before.primitives
     scene.tetflora.quality = 'FINAL'
     scene.tetflora.max_polygons = 1000
-    assert _forecast().primitives == 1000
+    assert 700 < _forecast().primitives < 1000
     scene.tetflora.max_polygons = 0
     scene.tetflora.expand_everything = True
     assert _forecast().primitives > 20_000_000
     scene.tetflora.expand_everything = False
     camera.rotation_euler = (3.14159, 0.0, 0.0)
     assert _forecast().primitives < before.primitives
+
+
+def test_what_a_limit_leaves_is_what_is_drawn():
+    """Of birches and spruces at full HD a third fewer were drawn than the panel said, with half of the memory."""
+    add_camera((0.0, -60.0, 10.0))
+    _wood(200)
+    scene = bpy.context.scene
+    scene.render.resolution_x, scene.render.resolution_y = 640, 360
+    scene.tetflora.max_polygons = 60_000
+    expected = _forecast()
+    made = refine.refine(scene, depsgraph())
+    assert expected.limit == "Max Polygons"
+    assert made.polygons_meshed + made.polygons_proxy == pytest.approx(expected.primitives, rel=0.15)
 
 
 def test_an_estimate_makes_nothing_in_the_file_where_the_camera_moves():

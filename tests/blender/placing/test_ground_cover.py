@@ -5,11 +5,13 @@
 from __future__ import annotations
 
 import threading
+from types import SimpleNamespace
 
 import bpy
 import numpy as np
 import pytest
 
+from operators.layers import TETFLORA_OT_ground_cover
 from tests.blender.scenes import add_mesh, add_plant, depsgraph, select
 from tetflora_addon.blender.attributes import values_of
 from tetflora_addon.blender.materials.soil import is_soil
@@ -261,6 +263,22 @@ def test_a_cover_that_is_there_is_kept_where_its_renewal_is_stopped():
     steps.close()
     (cover,) = _covers()
     assert ([e.species for e in cover.mix], cover.density, cover.made, len(bpy.data.objects)) == before
+
+
+def test_a_cover_that_is_done_stays_where_strewing_its_leaves_is_stopped():
+    _wood()
+    scene = bpy.context.scene
+    scene.tetflora.year.enabled, scene.tetflora.year.day = True, 300.0
+    made = SimpleNamespace(soil=True, fallen=True)
+    steps = TETFLORA_OT_ground_cover.steps(made, bpy.context)
+    for _ in steps:
+        assert not hasattr(made, "cancelled") or _covers()
+        if hasattr(made, "cancelled"):
+            break
+    steps.close()
+    assert made.cancelled == "Stopped; the cover stays, without fallen leaves"
+    (cover,) = _covers()
+    assert cover.made
 
 
 def test_soil_is_browner_under_trees_and_greener_in_the_light():

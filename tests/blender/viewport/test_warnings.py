@@ -70,6 +70,22 @@ def test_daylight_never_touches_what_is_the_artists():
     assert [o for o in scene.objects if o.type == 'LIGHT'] == [sun]
 
 
+@pytest.mark.parametrize("touched", [False, "moved", "dimmed", "animated"])
+def test_daylight_hides_the_lamp_of_the_startup_file_but_none_of_the_artists(touched):
+    scene = bpy.context.scene
+    lamp = bpy.data.objects.new("Light", bpy.data.lights.new("Light", 'POINT'))
+    lamp.data.energy, lamp.location = 1000.0, (4.076245, 1.005454, 5.903862)  # as in Blender's own file
+    scene.collection.objects.link(lamp)
+    if touched == "moved":
+        lamp.location.x += 1.0
+    elif touched == "dimmed":
+        lamp.data.energy = 900.0
+    elif touched:
+        lamp.keyframe_insert("location", frame=1)
+    bpy.ops.tetflora.daylight()
+    assert lamp.hide_render == lamp.hide_viewport == (not touched)
+
+
 def test_daylight_follows_hour_season_and_clouds():
     scene = bpy.context.scene
     energy, height = {}, {}
@@ -180,7 +196,7 @@ def test_nothing_that_the_panel_says_is_cut_in_a_sidebar_of_usual_width(monkeypa
         assert blf.dimensions(0, f"{short.value} (+2)")[0] <= 110.0, short.value
         assert all(blf.dimensions(0, one.value)[0] <= 58.0 for one in button[:1]), button[0].value
     scene, layer = bpy.context.scene, bpy.context.view_layer
-    found = Estimate(1, 870_000.0, 1500.0, 13.2 * memory.GIGABYTE, False)
+    found = Estimate(1, 870_000.0, 1500.0, 13.2 * memory.GIGABYTE, "")
     monkeypatch.setattr(forecast, "forecast", lambda *_: found)
     add_camera()
     said = [forecast.forecast_text(scene, layer), "Not refined: renders show no plants"]

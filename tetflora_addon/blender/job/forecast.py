@@ -94,10 +94,7 @@ def _text_for(scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer) -> str:
     size = found.memory / _GIGA
     taken = seconds_text(seconds_here(found)), polygons_text(found.primitives), f"{size:.{int(size < 10.0)}f} GB"
     text = f"About {', '.join(taken)}"
-    if not found.limited:
-        return text
-    most = scene.tetflora.max_polygons
-    return f"{text}\nLimited by {'Max Polygons' if most and found.primitives >= most else 'Max Memory'}"
+    return f"{text}\nLimited by {found.limit}" if found.limit else text
 
 
 def memory_text(scene: bpy.types.Scene) -> str:

@@ -173,17 +173,10 @@ Stack = tuple[bpy.types.Node, ...]  # groups that the walk is in
 _CURVE = 1025  # points at which ramps and curves are known
 # Means over directions from which diffuse light comes: of Fresnel's fraction for 1.45, of the angle's cosine taken
 # from 1; and over instances or islands.
-_MEANS = {
-    ('FRESNEL', "Fac"): 0.09,
-    ('LAYER_WEIGHT', "Fresnel"): 0.09,
-    ('LAYER_WEIGHT', "Facing"): 0.33,
-    ('NEW_GEOMETRY', "Backfacing"): 0.5,
-    ('NEW_GEOMETRY', "Random Per Island"): 0.5,
-    ('OBJECT_INFO', "Random"): 0.5,
-    ('PARTICLE_INFO', "Random"): 0.5,
-    ('HAIR_INFO', "Random"): 0.5,
-    ('LIGHT_PATH', "Is Camera Ray"): 1.0,
-}
+_MEANS = {(kind, "Random"): 0.5 for kind in ('OBJECT_INFO', 'PARTICLE_INFO', 'HAIR_INFO')}
+_MEANS |= {('FRESNEL', "Fac"): 0.09, ('LAYER_WEIGHT', "Fresnel"): 0.09, ('LAYER_WEIGHT', "Facing"): 0.33}
+_MEANS |= {('NEW_GEOMETRY', "Backfacing"): 0.5, ('NEW_GEOMETRY', "Random Per Island"): 0.5}
+_MEANS |= {('LIGHT_PATH', "Is Camera Ray"): 1.0}
 
 
 class ImageMissing(Exception):

@@ -140,13 +140,9 @@ def _whole(height: Floats) -> Floats:
 NAME = "Stand"
 #: A wood of central Europe, with shares of what is planted and of seeds.
 MIXED_WOOD = {
-    "beech": (3.0, 2.0),
-    "oak": (3.0, 1.0),
-    "birch": (3.0, 3.0),
-    "ash": (1.0, 1.0),
-    "hornbeam": (1.0, 1.0),
+    "beech": (3.0, 2.0), "oak": (3.0, 1.0), "birch": (3.0, 3.0), "ash": (1.0, 1.0), "hornbeam": (1.0, 1.0),
     "hazel": (0.5, 1.0),
-}
+}  # fmt: skip
 #: State of a stand: what does not say how it grows, and what another does not get from it.
 _STATE = {"rna_type", "limits", "limits_shown", "name", "is_grown", "last_year", "plants", "grown_by", "species_index"}
 _OWN = {*_STATE, "biome", "grounds", "species"}
