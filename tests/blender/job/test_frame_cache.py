@@ -18,7 +18,7 @@ from tests.blender.scenes import add_camera, add_mesh, add_plant, datablocks, de
 from tetflora_addon import memory
 from tetflora_addon.blender import compat
 from tetflora_addon.blender.job import contents, frame_cache, refine, render
-from tetflora_addon.blender.results.output import megabytes_held, result_collections
+from tetflora_addon.blender.results.output import MEGABYTES, PURPOSE, megabytes_held, result_collections
 from tetflora_addon.blender.scene.camera import read_camera
 from tetflora_addon.processes import pool
 
@@ -126,6 +126,18 @@ def test_results_that_wait_go_where_the_renderer_needs_their_memory(animation, m
     go(animation, FRAMES)
     assert len(frame_cache._entries) == 1
     assert made == [1, FRAMES // 2, FRAMES]
+
+
+def test_only_results_that_are_replaced_count_as_gone(animation):
+    other = bpy.data.scenes.new("other")
+    kept, own = bpy.data.collections.new("kept"), go(animation, 1)
+    other.collection.children.link(kept)
+    kept[PURPOSE], kept[MEGABYTES] = 'RENDER', 50.0
+    assert megabytes_held('RENDER') == pytest.approx(own[MEGABYTES] + 50.0)
+    assert megabytes_held('RENDER', animation) == pytest.approx(own[MEGABYTES])
+    frame_cache.stow(animation, [])
+    assert megabytes_held('RENDER', animation) == pytest.approx(own[MEGABYTES])
+    assert megabytes_held('VIEW', animation) == 0.0
 
 
 def held():

@@ -253,7 +253,7 @@ def steady_memory_left(scene: bpy.types.Scene, camera: Camera, purpose: str) -> 
     It stays what it was for the first results of a scene as long as it changes by less than `_STEADY`: a frame of a
     film is to be that frame alone, although caches grow, and other processes turn out to need more than was thought.
     """
-    left = memory_left(scene, camera) + 1e6 * megabytes_held(purpose)
+    left = memory_left(scene, camera) + 1e6 * megabytes_held(purpose, scene)
     known = scene.session_uid, most_memory(scene), picture_bytes(scene, camera)
     if not 1.0 / _STEADY < left / _left.setdefault(known, left) < _STEADY:
         _left[known] = left

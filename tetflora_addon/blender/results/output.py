@@ -205,9 +205,11 @@ def result_collections(scene: bpy.types.Scene, purpose: str | None = None) -> li
     ]
 
 
-def megabytes_held(purpose: str) -> float:
-    """Megabytes of all results of a purpose, those that wait for later frames included."""
-    return sum(c.get(MEGABYTES, 0.0) for c in bpy.data.collections if c.get(PURPOSE) == purpose)
+def megabytes_held(purpose: str, scene: bpy.types.Scene | None = None) -> float:
+    """Megabytes of all results of a purpose that are in this file, or in a scene or wait for later frames."""
+    every = [c for c in bpy.data.collections if c.get(PURPOSE) == purpose and c.library is None]
+    inside = every if scene is None else scene.collection.children_recursive
+    return sum(c.get(MEGABYTES, 0.0) for c in every if c in inside or not c.users)
 
 
 def release_copies(collection: bpy.types.Collection) -> None:
