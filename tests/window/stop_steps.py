@@ -13,7 +13,7 @@ from devtools.aliases import INSTALLED, alias
 
 alias(INSTALLED)
 from tests import places_files  # noqa: E402  (found only now)
-from tests.blender.scenes import add_plant, datablocks, select  # noqa: E402
+from tests.blender.scenes import add_mesh, add_plant, datablocks, select  # noqa: E402
 from tetflora_addon.blender import compat  # noqa: E402
 from tetflora_addon.blender.viewport import auto  # noqa: E402
 
@@ -59,6 +59,32 @@ def steps(ui):
             now = state()
             ui.values[key] = [what for what in before if before[what] != now[what]]
             ui.values[key] += [path.name for path in sorted(ui.out_dir.iterdir()) if path not in files]
+    yield from strew(ui)
+
+
+def strew(ui):
+    """Esc while leaves are strewn over a cover that is done, and undo; layers that cover something after each."""
+    ground = add_mesh("wood ground", size=12.0)
+    ground.location.x = 100.0
+    select(ground)
+    bpy.context.scene.tetflora.year.enabled, bpy.context.scene.tetflora.year.day = True, 300.0
+    with ui.override():
+        bpy.ops.tetflora.populate(count=8, species="birch", min_distance=1.0)
+        bpy.ops.ed.undo_push(message="Planted")
+    held = hold(bpy.types.TETFLORA_OT_ground_cover, 1, lambda job: "without fallen leaves" in job.cancelled)
+    with ui.override():
+        bpy.ops.tetflora.ground_cover('INVOKE_DEFAULT')
+    yield from ui.until(lambda: held["there"] or not running(ui), 120, "leaves that are strewn")
+    ui.press('ESC')
+    yield from ui.until(lambda: not running(ui), 30, "end of Ground Cover after Esc")
+    held["free"]()
+    yield 0.5
+    number = [sum(bool(one.covers) for one in bpy.context.scene.tetflora.layers)]
+    ui.move(*ui.center())
+    ui.press('Z', ctrl=True)
+    yield 2.0
+    number.append(sum(bool(one.covers) for one in bpy.context.scene.tetflora.layers))
+    ui.values["strewn"] = number
 
 
 def hide(ui, scene):
@@ -83,8 +109,8 @@ def hide(ui, scene):
     ui.values["said"] = said
 
 
-def hold(cls, number):
-    """Let an operator's steps stay at one of them, until Esc comes."""
+def hold(cls, number, late=lambda _job: True):
+    """Let an operator's steps stay at one of them, or where it is late, until Esc comes."""
     usual, held = cls.steps, {"there": False}
 
     def stays(self, context):
@@ -93,7 +119,7 @@ def hold(cls, number):
             while True:
                 progress = running.send(enough)
                 count += 1
-                held["there"] = count >= number
+                held["there"] = count >= number and late(self)
                 enough = yield progress
                 while held["there"]:
                     yield progress

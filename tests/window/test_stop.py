@@ -13,7 +13,7 @@ STEPS = "stop_steps", "stop", 240
 
 
 def test_escape_leaves_nothing_of_imports_exports_and_biomes(seen: dict) -> None:
-    left = {name: left for name, left in seen.items() if name != "said"}
+    left = {name: left for name, left in seen.items() if name not in {"said", "strewn"}}
     assert {name: what for name, what in left.items() if what not in ([], "ended")} == {}
     stopped = {name.split()[0] for name, what in left.items() if what == []}
     assert stopped >= {"grid", "csv", "big_tiff", "outlines", ".glb", ".obj", "biome"}
@@ -21,6 +21,10 @@ def test_escape_leaves_nothing_of_imports_exports_and_biomes(seen: dict) -> None
 
 def test_results_are_out_of_date_when_hidden_plants_are_shown_again(seen: dict) -> None:
     assert seen["said"] == [[], ["the plants"]]
+
+
+def test_a_cover_stays_where_its_leaves_are_stopped_and_can_be_undone(seen: dict) -> None:
+    assert seen["strewn"] == [1, 0]
 
 
 def test_blender_quits_in_the_middle_of_refine(full_blender: str, resources: Path, tmp_path: Path) -> None:

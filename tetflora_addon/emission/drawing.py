@@ -300,18 +300,20 @@ class _Tile(Canvas):
     def draw(self, parts: Sequence[Arrays], share: float, most: float, expected: float, known: bool | None) -> None:
         """All parts of a tile, a share of the image, with no more than so many polygons and facets.
 
-        So many are expected to be asked for, or known. Where they turn out to be far fewer, it stops once.
+        So many are expected to be asked for, or known. Where they turn out to be far fewer, or too many, it stops once.
         """
         given, frontier, room, least = self.given, self.frontier, FULL * most, 0.0
         if len(given.occluders):
             self.add_shown(given.occluders)
+            frontier.empty = self.coverage.depth.copy()  # plants before a ground need as many layers as before the sky
         for slabs in frontier.slabs(parts, _SLAB * most):
             follow, before = self._following(expected, bool(known)) if np.isfinite(most) else 0.0, self.number
             # Rounded: what memory there is, to the byte, shall not change the last bit of each side.
             times = round((follow / max(room - before, 1.0)) ** (1.0 / FEWER), 9)
             least, times = least or times, max(min(times, UNEVEN * (least or times)), given.finest)
-            if known is None and before and _LARGER * times < 1.0:
-                self.asked, self.again = self.asked + follow, False
+            few = known is None and before > 0.0 and _LARGER**FEWER * (self.asked + follow) < room
+            if few or (before > room and not known):  # what is not drawn hides nothing: all behind it would be opened
+                self.asked, self.again = self.asked + follow, not few
                 return
             frontier.facet, frontier.kinds = times * given.facet, [kind.coarser(times) for kind in given.kinds]
             for number, (kind, slab) in enumerate(zip(frontier.kinds, slabs, strict=True)):

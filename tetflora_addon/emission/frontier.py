@@ -239,13 +239,13 @@ class Frontier:
         self.hidden: list[list[Waiting]] = [[] for _ in kinds]
         self.outside: list[list[Waiting]] = [[] for _ in kinds]
         self.shown: list[Shown] = []
-        self._empty, self._filling = coverage.depth.copy(), np.zeros(1)
+        self.empty, self._filling = coverage.depth.copy(), np.zeros(1)
 
     def layers(self) -> float:
         """Layers that were drawn, on average, in the pixels that are full or will be, were each drawn at random."""
-        row, column = np.nonzero(self.coverage.depth == self._empty)
+        row, column = np.nonzero(self.coverage.depth == self.empty)
         open_ = self._filling.take(self.coverage.cells(column + self.coverage.first, row), mode="clip").sum()
-        return float(np.log1p((self._empty.size - len(row)) / max(open_, 1.0)))
+        return float(np.log1p((self.empty.size - len(row)) / max(open_, 1.0)))
 
     def pool(self, kind: FrontierKind, parts: Arrays) -> Waiting:
         """Parts (n,) of a kind with spheres around them."""

@@ -317,6 +317,21 @@ def test_a_budget_holds(share: float) -> None:
     assert 0.5 * most < number_of(most) <= most
 
 
+def test_plants_before_a_ground_are_as_fine_as_before_the_sky() -> None:
+    """Ground that fills the image at first is no layer of plants: a meadow had facets of 7 pixels, of 1.7 that fit."""
+    flora, _, camera, result = wood()
+    detail = fit_to_budget(result, camera, RefinementSettings(max_polygons=int(0.3 * number_of())))
+    options = {"hidden": detail.coarser, "most": detail.most, "finest": detail.finest}
+    far = np.array([[-900.0, 400, -900], [900, 400, -900], [900, 400, 900], [-900, 400, 900]])
+    sides = []
+    for ground in (None, far[[[0, 1, 2], [0, 2, 3]]]):
+        found = support.drawn(
+            flora, result, detail.camera, detail.facet, detail.leaf_limit, occluders=ground, **options
+        )
+        sides.append(np.quantile(pixels_of(found[1], camera)[found[2]], [0.5, 0.95]))
+    np.testing.assert_allclose(sides[1], sides[0], rtol=0.1)
+
+
 def test_within_pixels_of_small_images_nothing_hidden_shows() -> None:
     """A small image has facets finer than its pixels: what hides others is known as finely as they are."""
     blocks, facets, seen = drawn_with()
