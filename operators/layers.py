@@ -90,8 +90,7 @@ class _InParts(ModalJob):
             result = super().modal(context, event)
         finally:
             # What was done so far can be undone. Not in `cancel`: Blender calls that also as it loads files and quits.
-            stays = result == {'CANCELLED'} and self.cancelled != ModalJob.cancelled
-            if stays and bpy.ops.ed.undo_push.poll():
+            if result == {'CANCELLED'} and self.cancelled != ModalJob.cancelled and bpy.ops.ed.undo_push.poll():
                 bpy.ops.ed.undo_push(message=self.bl_label)
         return result
 

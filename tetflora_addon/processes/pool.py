@@ -109,24 +109,26 @@ def in_processes(
         _tidy()
 
 
-def number(limit: float | None = None) -> int:
+def number(limit: float | None = None, each: float | None = None) -> int:
     """Processes that may work at the same time: none, or two at least.
 
     Parameters
     ----------
     limit : float, optional
         Bytes that Blender and they may take together; by default as `set_memory_limit` was told.
+    each : float, optional
+        Bytes of one; by default the most that one has been seen with.
     """
     if _pool.stopped or _pool.broken or not _python():
         return 0
     allowed = _pool.limit if limit is None else _PART * limit
-    most = int(min(parallel.threads(), allowed / _pool.largest))
+    most = int(min(parallel.threads(), allowed / (each or _pool.largest)))
     return most if most > 1 else 0
 
 
 def share(limit: float) -> float:
-    """Bytes of a limit for Blender and all processes together that these need."""
-    return number(limit) * _pool.largest
+    """Bytes of a limit for Blender and all processes together that these need; the same whatever one was seen with."""
+    return number(limit, _BYTES_EACH) * _BYTES_EACH
 
 
 def set_memory_limit(limit: float) -> None:

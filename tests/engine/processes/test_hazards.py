@@ -144,10 +144,10 @@ def test_threads_end_and_begin_again() -> None:
 
 def test_they_keep_to_a_part_of_the_memory(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(parallel, "threads", lambda: 16)
-    assert pool.number(1e12) == 16 and pool.share(1e12) == 16 * pool._pool.largest
+    assert pool.number(1e12) == 16 and pool.share(1e12) == 16 * pool._BYTES_EACH
     for limit in (1e9, 2e9, 4e9, 8e9):
         assert pool.share(limit) <= limit / 4
-        assert pool.share(limit) == pool.number(limit) * pool._pool.largest
+        assert pool.share(limit) == pool.number(limit, pool._BYTES_EACH) * pool._BYTES_EACH
     assert pool.share(1e9) == 0.0
     pool.set_memory_limit(2e9)
     list(in_processes(in_child.after_a_while, 0.02, range(12)))
