@@ -52,8 +52,8 @@ from ..scene.plants import NoPlantsError, read_plants
 from ..settings import check_limits, most_memory, season_of, wind_of, years_of
 from ..worker import steps_in_thread
 
-#: Memory that is left over what was left, from which on it counts as another; and that by scene, limit and picture.
-_STEADY = 1.2
+#: Memory that is left over what was left, from which on it counts as another: results take less than two thirds of it.
+_STEADY = 1.5
 _left: dict[tuple[int, float, int], float] = {}
 
 
