@@ -311,7 +311,7 @@ class _Tile(Canvas):
             # Rounded: what memory there is, to the byte, shall not change the last bit of each side.
             times = round((follow / max(room - before, 1.0)) ** (1.0 / FEWER), 9)
             least, times = least or times, max(min(times, UNEVEN * (least or times)), given.finest)
-            few = known is None and before > 0.0 and _LARGER**FEWER * (self.asked + follow) < room
+            few = known is None and before and _LARGER * max(times, ((self.asked + follow) / room) ** (1 / FEWER)) < 1.0
             if few or (before > room and not known):  # what is not drawn hides nothing: all behind it would be opened
                 self.asked, self.again = self.asked + follow, not few
                 return

@@ -278,6 +278,16 @@ def test_room_to_spare_changes_nothing() -> None:
     assert made[0] == made[1]
 
 
+@pytest.mark.parametrize("most", [1e7, np.inf])
+def test_a_tile_that_may_not_be_finer_is_drawn_once(monkeypatch: pytest.MonkeyPatch, most: float) -> None:
+    """However much room there is to spare."""
+    flora, _, camera, result = wood()
+    drawn, usual = [], subject._Tile.draw
+    monkeypatch.setattr(subject._Tile, "draw", lambda self, *given: drawn.append(1) or usual(self, *given))
+    support.drawn(flora, result, camera, 1.2, 0.6, most=most)
+    assert len(drawn) == subject.tiles_of(camera)
+
+
 def test_some_megabytes_more_or_less_change_nothing() -> None:
     """Where memory is the limit: it is never the same for two frames; half of it is still much less."""
     _, _, camera, result = wood()
