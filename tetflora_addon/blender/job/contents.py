@@ -250,8 +250,8 @@ def memory_left(scene: bpy.types.Scene, camera: Camera | None = None) -> float:
 def steady_memory_left(scene: bpy.types.Scene, camera: Camera, purpose: str) -> float:
     """`memory_left` for results that take the place of all earlier ones of their purpose.
 
-    It stays what it was for the first results of a scene as long as it changes by less than `_STEADY`: a frame of a
-    film is to be that frame alone, although caches grow, and other processes turn out to need more than was thought.
+    In bytes. It stays what it was for the first results of a scene as long as it changes by less than `_STEADY`: a
+    frame of a film is to be that frame alone, although caches and what the process does not give back grow.
     """
     left = memory_left(scene, camera) + 1e6 * megabytes_held(purpose, scene)
     known = scene.session_uid, most_memory(scene), picture_bytes(scene, camera)
