@@ -89,7 +89,8 @@ def steps(ui: Any) -> Iterator[float | None]:
                 bpy.ops.tetflora.ground_cover('INVOKE_DEFAULT')
             yield from ui.until(lambda: not ui.window.modal_operators, 300, "cover")
         panel = _brush_panel() if shown == "brush" else next(cls for cls in registered if cls.__name__ == shown)
-        opened = _register_open(panel, name, sections)
+        opened = _opened(panel, name, sections)
+        bpy.utils.register_class(opened)
         yield from ui.show_sidebar("TetFlora")
         yield from ui.picture(f"panel-{name}")
         bpy.utils.unregister_class(opened)
@@ -162,10 +163,11 @@ def _brush_panel() -> Any:
     return type("TETFLORA_PT_brush", (bpy.types.Panel,), members)
 
 
-def _register_open(cls: Any, picture: str, sections: list[str]) -> Any:
-    """Register a copy of a panel that is open; under another name, because Blender remembers what was closed."""
-    import bpy
+def _opened(cls: Any, picture: str, sections: list[str]) -> Any:
+    """A copy of a panel that is open; under another name, because Blender remembers what was closed.
 
+    The panel must not be registered with it: Blender forgets the class of a panel whose copy is unregistered.
+    """
     base = sys.modules[f"{cls.__module__.rpartition('.')[0]}.base"]
     plain = getattr(base.section, "plain", base.section)
 
@@ -177,9 +179,7 @@ def _register_open(cls: Any, picture: str, sections: list[str]) -> Any:
     base.section = sys.modules[cls.__module__].section = section
     name = f"{cls.__name__}_{picture.replace('-', '_')}"
     place = {"bl_space_type": 'VIEW_3D', "bl_region_type": 'UI', "bl_category": "TetFlora", "bl_context": ""}
-    made = type(name, (cls,), {"bl_options": set(), "bl_idname": name, **place})
-    bpy.utils.register_class(made)
-    return made
+    return type(name, (cls,), {"bl_options": set(), "bl_idname": name, **place})
 
 
 def _convert(*arguments: str | Path) -> None:

@@ -6,7 +6,6 @@ from __future__ import annotations
 
 from types import SimpleNamespace
 
-import bpy
 import pytest
 
 from devtools import window_pictures
@@ -21,9 +20,9 @@ def test_sections_are_open_in_the_picture_that_names_them(monkeypatch: pytest.Mo
         return SimpleNamespace(label=lambda text: None), None
 
     monkeypatch.setattr(base, "section", base.section)
+    monkeypatch.setattr(layers, "section", base.section, raising=False)
     for picture, sections in (("stand", ["Site"]), ("layers", ["Where"])):
-        made = window_pictures._register_open(layers.TETFLORA_PT_layers, picture, sections)
-        bpy.utils.unregister_class(made)
+        window_pictures._opened(layers.TETFLORA_PT_layers, picture, sections)
         for title in ("Site", "Where"):
             layers.base.section(SimpleNamespace(panel=panel), title)
         assert asked == {title: title not in sections for title in ("Site", "Where")}
