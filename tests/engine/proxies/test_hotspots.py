@@ -95,6 +95,18 @@ def test_the_eye_counts_and_not_where_a_camera_of_several_stands() -> None:
     assert (ratios[0] != 1.0).all()
 
 
+def test_a_lamp_lights_each_plant_as_a_sun_from_its_side() -> None:
+    flora, place = support.small_flora(), np.array([(0.0, 0.0, 0.0), (3.0, 1.0, 0.0)])
+    plants = trunks(flora.rows, support.plants([1, 2], position=place))
+    eye, facet, lamp = support.camera((0, -8, 2), (0, 0, 2), pixels=64), np.full(2, 0.3), np.array([4.0, -5.0, 9.0])
+    found = light_ratios(flora, plants, facet, eye, (Light("POINT", lamp, np.array([0.0, 0.0, -1.0])),))
+    for number, toward in enumerate(found.toward):
+        middle = plants.position[number] + 0.5 * plants.length[number] * plants.frame[number, :, 2]
+        assert toward == pytest.approx((lamp - middle) / np.linalg.norm(lamp - middle))
+        sun = light_ratios(flora, plants, facet, eye, (Light("SUN", np.zeros(3), -toward),))
+        assert found.hotspot[number] == pytest.approx(sun.hotspot[number])
+
+
 @given(st.floats(1.0, 100.0), st.floats(0.0, 1.0))
 def test_facets_are_evened_and_send_as_much_light(leaves: float, part: float) -> None:
     cosine = (np.arange(4000) + 0.5) / 4000
