@@ -8,7 +8,6 @@ it: reading the scene, refining, writing meshes, and what is kept.
 
 from __future__ import annotations
 
-import argparse
 import hashlib
 import itertools
 import json
@@ -26,7 +25,7 @@ from tetflora_addon.blender.job.render import on_render_end, on_render_pre
 from tetflora_addon.blender.results.output import result_collections
 
 from .pictures import flip_map, read_picture, render
-from .report import Targets, peak_mb, records_of
+from .report import Targets, apart, peak_mb
 
 #: Frames that are timed: five seconds of animation, in which the camera goes some seven meters.
 FRAMES = 120
@@ -43,34 +42,23 @@ TARGETS: Targets = {
     "frames_differ": {"max": 0},
     "flicker": {"max": 0.01},
 }
-QUICK_TARGETS: Targets = TARGETS
 
 
-def options(parser: argparse.ArgumentParser) -> None:
-    """What may be asked for beside everything."""
-    parser.add_argument("--alone", type=int, metavar="FRAME", help="only this frame's fingerprint, as a line of JSON")
-
-
-def run(given: argparse.Namespace) -> dict[str, float] | None:
+def run(quick: bool) -> dict[str, float]:
     """Measure; see the table in ``docs/measurements.md`` for what the figures mean."""
-    if given.alone:
-        print(json.dumps(frame_alone(given.alone)), flush=True)
-        return None
     figures: dict[str, float] = {}
     for name in fly_through.SCENES:
         session.clean_file()
         figures |= {f"{key}_{name}": value for key, value in _timed(name).items()}
     session.clean_file()
     figures |= _flight()
-    chosen = np.linspace(1, FRAMES, QUICK_ALONE if given.quick else ALONE).round().astype(int).tolist()
+    chosen = np.linspace(1, FRAMES, QUICK_ALONE if quick else ALONE).round().astype(int).tolist()
     session.clean_file()
     sequence, refined_at = _film(chosen)
     figures["frames_alone"] = len(chosen)
-    figures["frames_differ"] = sum(
-        records_of(["animation", "--alone", str(frame)])[-1] != sequence[frame] for frame in chosen
-    )
+    figures["frames_differ"] = sum(apart(frame_alone, frame) != sequence[frame] for frame in chosen)
     session.clean_file()
-    return figures | _flicker(refined_at, QUICK_AROUND if given.quick else AROUND)
+    return figures | _flicker(refined_at, QUICK_AROUND if quick else AROUND)
 
 
 def _timed(name: str) -> dict[str, float]:

@@ -4,7 +4,7 @@
 
     python -m benchmarks assets [--quick]                                  # everything, with targets
     python -m benchmarks assets --only crown pictures [--quick]            # some parts
-    python -m benchmarks assets --case time leaves plain 20 near           # one case, as a line of JSON
+    python -m benchmarks assets --call woods '["leaves", true]'            # one case, as a line of JSON
 
 Parts: ``compile`` (seconds, bytes, areas and bounds), ``pictures`` (FLIP), ``crown`` (light through a crown of cards,
 color of its tenths), ``forest`` (10,000 and a million instances), ``cycles`` (from a .blend file to an image).
@@ -20,7 +20,6 @@ instances would be cheaper.
 from __future__ import annotations
 
 import argparse
-import json
 import re
 import sys
 import time
@@ -35,20 +34,18 @@ import numpy as np
 from mathutils import Matrix
 from numpy.typing import NDArray
 
-from devtools.formats import set_format
 from examples import stage
 from tetflora_addon import parallel, storage
 from tetflora_addon.assets import asset_cache
 from tetflora_addon.assets.compiled import compile_steps
-from tetflora_addon.blender import compat
 from tetflora_addon.blender.assets.places import Target, digest_of, read_source_steps
 from tetflora_addon.blender.job import refine
 from tetflora_addon.jobs import run_to_end
 from tetflora_addon.processes import pool
 
 from . import asset_trees
-from .pictures import difference, read_picture, render, timed_refine, timed_render
-from .report import ROOT, Targets, cpu_s, forget_peak, records_of
+from .pictures import changed, difference, read_picture, render, timed_refine, timed_render
+from .report import ROOT, Targets, apart, cpu_s, forget_peak
 
 FOLDER = ROOT / "out" / "assets"
 #: Triangles from which on seconds and bytes of compiling are told for each of them.
@@ -110,31 +107,21 @@ QUICK_TARGETS: Targets = {
 def options(parser: argparse.ArgumentParser) -> None:
     """What may be asked for beside everything."""
     parser.add_argument("--only", nargs="+", choices=tuple(PARTS), default=(), metavar="PART", help=", ".join(PARTS))
-    parser.add_argument("--case", nargs="+", metavar="WORD", help="one case in this process, as a line of JSON")
-    parser.add_argument("--store", action="store_true", help="only save the file of a case")
-    parser.add_argument("--detail", default="AUTO", choices=("AUTO", "REFINE"), help="what refinement may leave plain")
-    parser.add_argument("--cache", type=Path, help="folder in which compiled assets are kept for later processes")
 
 
-def run(given: argparse.Namespace) -> dict[str, float] | None:
+def run(given: argparse.Namespace) -> dict[str, float]:
     """Figures of parts, by default of all, or for a quick run of those that take least."""
     FOLDER.mkdir(parents=True, exist_ok=True)
-    if given.case:
-        print(json.dumps(measure(given.case, given)), flush=True)
-        return None
     figures: dict[str, float] = {}
     for name in given.only or (QUICK_PARTS if given.quick else tuple(PARTS)):
         figures |= PARTS[name](given.quick)
     return figures
 
 
-def apart(*words: object, quick: bool = False, options: tuple[str, ...] = ()) -> dict[str, float]:
-    """Figures of a case by a process of its own; none, and why not on stderr, where it fails."""
-    command = ["assets", "--case", *map(str, words), *options, *(["--quick"] if quick else [])]
+def tried(function: Callable[..., dict], *given: object) -> dict[str, float]:
+    """As `apart`; none, and why not on stderr, where it fails."""
     try:
-        if words[0] == "time":
-            records_of([*command, "--store"])
-        return records_of(command)[-1]
+        return apart(function, *given)
     except RuntimeError as error:
         print(error, file=sys.stderr, flush=True)
         return {}
@@ -145,7 +132,7 @@ def compiling(quick: bool) -> dict[str, float]:
 
     Seconds and bytes a triangle count of kinds with more than `LARGE` triangles: others cost what any asset does.
     """
-    made = {kind: apart("compile", kind, quick=quick) for kind in asset_trees.KINDS}
+    made = {kind: tried(compiled, kind, quick) for kind in asset_trees.KINDS}
     figures = {f"{key}_{kind}": value for kind, found in made.items() for key, value in found.items()}
     worst = {"area_error": "area_error", "beyond_bounds": "beyond_bounds", "compile_s_per_mtri": "compile_s_per_mtri"}
     worst |= {"compile_again_s": "again_s", "bytes_per_triangle": "bytes_per_triangle"}
@@ -160,7 +147,7 @@ def pictures(quick: bool) -> dict[str, float]:
     """FLIP of all kinds; quick: of one."""
     figures: dict[str, float] = {}
     for kind in asset_trees.KINDS[:1] if quick else asset_trees.KINDS:
-        figures |= apart("woods", kind, quick=quick)
+        figures |= tried(woods, kind, quick)
     flips = [value for key, value in figures.items() if key.startswith("flip_")]
     noises = [value for key, value in figures.items() if key.startswith("noise_")]
     if flips:
@@ -172,7 +159,7 @@ def pictures(quick: bool) -> dict[str, float]:
 
 def crowns(quick: bool) -> dict[str, float]:
     """Transmittance of a crown of cards, and color of its tenths: of its surfaces, and as they are lit."""
-    found = apart("crown", "cards", quick=quick)
+    found = tried(crown, "cards", quick)
     for name, key in (("dT_max", "dT_"), ("tenth_max", "tenth_"), ("tenth_lit_max", "lit_")):
         values = [abs(value) for other, value in found.items() if other.startswith(key)]
         found |= {name: max(values)} if values else {}
@@ -184,10 +171,10 @@ def forest(quick: bool) -> dict[str, float]:
     figures: dict[str, float] = {}
     for count, end in ((FOREST, "10k"), *(() if quick else ((MILLION, "1m"),))):
         for cached in ("", "_cached"):
-            options = ("--detail", "REFINE", *(("--cache", str(FOLDER / "cache")) if cached else ()))
+            given = False, "REFINE", str(FOLDER / "cache") if cached else ""
             if cached:
-                apart("time", "leaves", "refined", 20, "far", options=options)
-            found = apart("time", "leaves", "refined", count, "near", options=options)
+                _timed("refined", 20, "far", *given)
+            found = _timed("refined", count, "near", *given)
             if not found:
                 continue
             figures |= {f"refine_emit_s_{end}{cached}": found["refine_s"], f"total_s_{end}{cached}": found["total_s"]}
@@ -201,8 +188,8 @@ def cycles(quick: bool) -> dict[str, float]:
     for count in QUICK_COUNTS if quick else COUNTS:
         for distance in ENDS:
             end = f"{count}_{distance}"
-            theirs = apart("time", "leaves", "plain", count, distance, quick=quick)
-            ours = apart("time", "leaves", "refined", count, distance, quick=quick)
+            theirs = _timed("plain", count, distance, quick)
+            ours = _timed("refined", count, distance, quick)
             figures |= _named("cycles", "plain", end, theirs) | _named("cycles", "refined", end, ours)
             if ours and theirs:
                 figures[f"cycles_time_ratio_{end}"] = ours["total_s"] / theirs["total_s"]
@@ -227,23 +214,18 @@ PARTS: dict[str, Callable[[bool], dict[str, float]]] = {
 QUICK_PARTS = ("compile", "crown")
 
 
-def measure(words: list[str], given: argparse.Namespace) -> dict[str, float]:
-    """Figures of one case, in this process."""
-    name, kind, *rest = words
-    if given.cache:
-        storage.set_folder(given.cache)
-    if name == "compile":
-        return compiled(kind, given.quick)
-    if name != "time":
-        return {"woods": woods, "crown": crown}[name](kind, FOLDER, given.quick)
-    what, instances, distance = rest
-    wanted = Scatter(kind, int(instances), distance, quick=given.quick)
-    path = FOLDER / f"{kind}-{instances}-{distance}{'-quick' if given.quick else ''}.blend"
-    if not given.store:
-        return timed(path, what, given.detail)
+def _timed(what: str, instances: int, distance: str, quick: bool, *given: str) -> dict[str, float]:
+    """As `timed`, from a file that another process has written."""
+    path = FOLDER / f"leaves-{instances}-{distance}{'-quick' if quick else ''}.blend"
     if not path.exists():
-        build(bpy.context.scene, wanted)
-        bpy.ops.wm.save_as_mainfile(filepath=str(path), compress=False)
+        tried(stored, str(path), instances, distance, quick)
+    return tried(timed, str(path), what, *given)
+
+
+def stored(path: str, instances: int, distance: str, quick: bool) -> dict[str, float]:
+    """Save a wood of leafy trees, which is read more quickly without compression."""
+    build(bpy.context.scene, Scatter("leaves", instances, distance, quick=quick))
+    bpy.ops.wm.save_as_mainfile(filepath=path, compress=False)
     return {"stored": 1.0}
 
 
@@ -297,30 +279,19 @@ def scatter(scene: bpy.types.Scene, assets: bpy.types.Collection, instances: int
     ground.name, ground.data.name = "Scatter", "Scatter"
     wide = side * SPACING
     ground.data.transform(Matrix.Translation((0.0, wide / 2, 0.01)) @ Matrix.Diagonal((wide, wide, 1.0, 1.0)))
-    ground.data.materials.append(_plain("Forest floor", (0.09, 0.075, 0.045)))
+    ground.data.materials.append(stage.dull("Forest floor", (0.09, 0.075, 0.045)))
     ground.modifiers.new("Scatter", 'NODES').node_group = _scatter_nodes(assets, side, instances, seed)
     bpy.context.view_layer.update()
     return ground
 
 
 def _scatter_nodes(assets: bpy.types.Collection, side: int, instances: int, seed: int) -> bpy.types.GeometryNodeTree:
-    tree = bpy.data.node_groups.new("Scatter", 'GeometryNodeTree')
-    tree.interface.new_socket("Geometry", in_out='INPUT', socket_type='NodeSocketGeometry')
-    tree.interface.new_socket("Geometry", in_out='OUTPUT', socket_type='NodeSocketGeometry')
+    tree, given, placed, made = stage.instancing("Scatter", assets)
     new, link = tree.nodes.new, tree.links.new
-    given, made, both = new("NodeGroupInput"), new("NodeGroupOutput"), new("GeometryNodeJoinGeometry")
-    grid, moved, placed = (
-        new("GeometryNodeMeshGrid"),
-        new("GeometryNodeSetPosition"),
-        new("GeometryNodeInstanceOnPoints"),
-    )
-    members = new("GeometryNodeCollectionInfo")
+    grid, moved, both = (new(f"GeometryNode{kind}") for kind in ("MeshGrid", "SetPosition", "JoinGeometry"))
     wide = (side - 1) * SPACING
     for name, value in (("Size X", wide), ("Size Y", wide), ("Vertices X", max(side, 2)), ("Vertices Y", max(side, 2))):
         grid.inputs[name].default_value = value
-    members.inputs["Collection"].default_value = assets
-    members.inputs["Separate Children"].default_value = members.inputs["Reset Children"].default_value = True
-    placed.inputs["Pick Instance"].default_value = True
     jitter = 0.3 * SPACING
     middle = wide / 2 + SPACING / 2
     offset = _random(tree, 'FLOAT_VECTOR', (-jitter, middle - jitter, 0.0), (jitter, middle + jitter, 0.0), seed)
@@ -329,7 +300,6 @@ def _scatter_nodes(assets: bpy.types.Collection, side: int, instances: int, seed
     link(grid.outputs["Mesh"], moved.inputs["Geometry"])
     link(offset, moved.inputs["Offset"])
     link(moved.outputs[0], placed.inputs["Points"])
-    link(members.outputs[0], placed.inputs["Instance"])
     link(turn, placed.inputs["Rotation"])
     link(_random(tree, 'INT', 0, 10_000, seed + 3), placed.inputs["Instance Index"])
     link(scale, placed.inputs["Scale"])
@@ -360,7 +330,7 @@ def add_meadow(scene: bpy.types.Scene, instances: int) -> None:
     """Ground that reaches beyond the wood."""
     bpy.ops.mesh.primitive_plane_add(size=2.0 * (1000.0 + SPACING * sqrt(instances)))
     bpy.context.object.name = "Meadow"
-    bpy.context.object.data.materials.append(_plain("Meadow", (0.12, 0.16, 0.06)))
+    bpy.context.object.data.materials.append(stage.dull("Meadow", (0.12, 0.16, 0.06)))
 
 
 def sight(distance: float) -> tuple[tuple[float, float, float], tuple[float, float, float]]:
@@ -370,9 +340,8 @@ def sight(distance: float) -> tuple[tuple[float, float, float], tuple[float, flo
 
 def set_sun(scene: bpy.types.Scene, light: str) -> None:
     """Turn the sun."""
-    elevation, azimuth = LIGHTS[light]
-    sun = next(obj for obj in scene.objects if obj.type == 'LIGHT')
-    sun.rotation_euler = (radians(90.0 - elevation), 0.0, radians(-azimuth))
+    bpy.data.objects.remove(scene.objects["Sun"])
+    stage.sun(scene, *LIGHTS[light])
 
 
 def prepare(scene: bpy.types.Scene) -> None:
@@ -386,12 +355,8 @@ def prepare(scene: bpy.types.Scene) -> None:
 def alone(scene: bpy.types.Scene, kind: str, quick: bool = False) -> bpy.types.Object:
     """One tree under an even sky, in parallel rays, so far that none of it is near; its instancer."""
     instancer = build(scene, Scatter(kind, 1, quick=quick))
-    for obj in [obj for obj in scene.objects if obj.type == 'LIGHT']:
-        bpy.data.objects.remove(obj)
-    background = next(node for node in scene.world.node_tree.nodes if node.type == 'BACKGROUND')
-    for link in list(background.inputs["Color"].links):
-        scene.world.node_tree.links.remove(link)
-    background.inputs["Color"].default_value, background.inputs["Strength"].default_value = (1.0, 1.0, 1.0, 1.0), 0.7
+    bpy.data.objects.remove(scene.objects["Sun"])
+    stage.even_sky(scene, strength=0.7)
     camera = scene.camera
     camera.data.type = 'ORTHO'
     camera.location, camera.rotation_euler = (0.0, -_ALONE, _WIDE / 2 - 1.0), (radians(90.0), 0.0, 0.0)
@@ -403,15 +368,6 @@ def frame(scene: bpy.types.Scene, pixel: float) -> None:
     scene.camera.data.ortho_scale = _WIDE
     scene.render.resolution_x = scene.render.resolution_y = round(_WIDE / pixel)
     bpy.context.view_layer.update()
-
-
-def _plain(name: str, color: tuple[float, float, float]) -> bpy.types.Material:
-    material = bpy.data.materials.new(name)
-    principled = next(node for node in compat.shader_tree(material).nodes if node.type == 'BSDF_PRINCIPLED')
-    principled.inputs["Base Color"].default_value = (*color, 1.0)
-    principled.inputs["Roughness"].default_value = 1.0
-    principled.inputs["Specular IOR Level"].default_value = 0.0
-    return material
 
 
 def resident_mb(what: str = "VmHWM") -> float:
@@ -434,10 +390,15 @@ def mark(detail: str) -> None:
             obj.tetflora.is_scatter = True
 
 
-def timed(path: Path, what: str, detail: str = "AUTO") -> dict[str, float]:
-    """From the file to the image: seconds by the clock, and memory."""
+def timed(path: str, what: str, detail: str = "AUTO", cache: str = "") -> dict[str, float]:
+    """From the file to the image: seconds by the clock, and memory.
+
+    detail: what refinement may leave plain; cache: folder in which compiled assets are kept for later processes.
+    """
+    if cache:
+        storage.set_folder(Path(cache))
     begun = time.perf_counter()
-    bpy.ops.wm.open_mainfile(filepath=str(path))
+    bpy.ops.wm.open_mainfile(filepath=path)
     scene = bpy.context.scene
     scene.render.engine = 'CYCLES'
     read_s, figures, refine_s = time.perf_counter() - begun, {}, 0.0
@@ -446,7 +407,7 @@ def timed(path: Path, what: str, detail: str = "AUTO") -> dict[str, float]:
         statistics, refine_s = timed_refine(scene)
         figures["polygons"] = statistics.polygons_meshed + statistics.polygons_proxy
     refined = memory()["peak_mb"]
-    render_s = timed_render(scene, path.with_name(f"{path.stem}-{what}.png"), TIMED)
+    render_s = timed_render(scene, Path(path).with_suffix(f".{what}.png"), TIMED)
     return {
         **figures,
         "read_s": read_s,
@@ -538,7 +499,7 @@ def _faces_of(source: object) -> list[tuple[NDArray, NDArray, NDArray]]:
     return made
 
 
-def woods(kind: str, folder: Path, quick: bool) -> dict[str, float]:
+def woods(kind: str, quick: bool) -> dict[str, float]:
     """FLIP of a refined wood in each light and from each distance, and of two plain pictures in the first light."""
     scene = bpy.context.scene
     build(scene, Scatter(kind, INSTANCES, size=PICTURE, quick=quick))
@@ -546,18 +507,18 @@ def woods(kind: str, folder: Path, quick: bool) -> dict[str, float]:
     masks: dict[str, NDArray[np.bool_]] = {}
     for distance, light in _views(scene):
         name, samples = f"{kind}-{distance}-{light}", _samples(distance, quick)
-        render(scene, folder / f"{name}-plain.png", samples)
+        render(scene, FOLDER / f"{name}-plain.png", samples)
         if light == next(iter(LIGHTS)):
-            masks[distance] = coverage(scene, folder / "coverage.png") > LEAST_COVERAGE
-            render(scene, folder / f"{name}-again.png", samples, seed=1)
-            pair = folder / f"{name}-plain.png", folder / f"{name}-again.png"
+            masks[distance] = coverage(scene, FOLDER / "coverage.png") > LEAST_COVERAGE
+            render(scene, FOLDER / f"{name}-again.png", samples, seed=1)
+            pair = FOLDER / f"{name}-plain.png", FOLDER / f"{name}-again.png"
             found[f"noise_{kind}_{distance}"] = difference(*pair, masks[distance]).flip
     mark("REFINE")
     for distance, light in _views(scene):
         name, samples = f"{kind}-{distance}-{light}", _samples(distance, quick)
         statistics, _ = timed_refine(scene)
-        render(scene, folder / f"{name}-refined.png", samples)
-        pair = folder / f"{name}-plain.png", folder / f"{name}-refined.png"
+        render(scene, FOLDER / f"{name}-refined.png", samples)
+        pair = FOLDER / f"{name}-plain.png", FOLDER / f"{name}-refined.png"
         made = difference(*pair, masks[distance])
         key = f"{kind}_{distance}_{light}"
         found |= {f"flip_{key}": made.flip, f"color_{key}": made.color}
@@ -579,21 +540,21 @@ def _views(scene: bpy.types.Scene) -> Iterator[tuple[str, str]]:
             yield distance, light
 
 
-def crown(kind: str, folder: Path, quick: bool) -> dict[str, float]:
+def crown(kind: str, quick: bool) -> dict[str, float]:
     """How much light a crown lets through, and the color of its tenths from below to above, refined and plain."""
     scene = bpy.context.scene
     alone(scene, kind, quick)
     samples = CROWN_SAMPLES // (QUICK_DIVISOR if quick else 1)
     frame(scene, FINE)
-    plain = silhouette(scene, folder / f"crown-{kind}-plain.exr", samples), albedo(scene, folder / "albedo.exr")
-    again = silhouette(scene, folder / f"crown-{kind}-again.exr", samples, 1), albedo(scene, folder / "albedo.exr", 1)
+    plain = silhouette(scene, FOLDER / f"crown-{kind}-plain.exr", samples), albedo(scene, FOLDER / "albedo.exr")
+    again = silhouette(scene, FOLDER / f"crown-{kind}-again.exr", samples, 1), albedo(scene, FOLDER / "albedo.exr", 1)
     found = {f"noise_{key}": value for key, value in _compared(plain, again).items()}
     mark("REFINE")
     for pixel in COARSE:
         frame(scene, pixel)
         statistics, _ = timed_refine(scene)
         frame(scene, FINE)
-        test = silhouette(scene, folder / f"crown-{kind}-{pixel}.exr", samples), albedo(scene, folder / "albedo.exr")
+        test = silhouette(scene, FOLDER / f"crown-{kind}-{pixel}.exr", samples), albedo(scene, FOLDER / "albedo.exr")
         found |= {f"{key}_{pixel}": value for key, value in _compared(plain, test).items()}
         found[f"crown_polygons_{pixel}"] = statistics.polygons_meshed + statistics.polygons_proxy
     refine.clear(scene)
@@ -631,13 +592,8 @@ def tenths(silhouette: NDArray[np.float32], rows: tuple[int, int]) -> NDArray[np
 
 def silhouette(scene: bpy.types.Scene, path: Path, samples: int, seed: int = 0) -> NDArray[np.float32]:
     """Light and alpha (height, width, 4), linear and premultiplied, of what is not ground or sky."""
-    with ground_as_holes():
-        before = scene.render.film_transparent
-        scene.render.film_transparent = True
-        try:
-            render(scene, path, samples, seed, form='OPEN_EXR')
-        finally:
-            scene.render.film_transparent = before
+    with ground_as_holes(scene):
+        render(scene, path, samples, seed, form='OPEN_EXR')
     return read_picture(path)
 
 
@@ -646,24 +602,10 @@ def albedo(scene: bpy.types.Scene, path: Path, seed: int = 0) -> NDArray[np.floa
     bpy.utils.expose_bundled_modules()
     import OpenImageIO  # Blender's own, which it shows only now
 
-    layer, render_settings, bounces = bpy.context.view_layer, scene.render, scene.cycles.max_bounces
-    scene.cycles.max_bounces = 0
-    for kind in _PASSES:
-        setattr(layer, f"use_pass_{kind}_color", True)
-    try:
-        with ground_as_holes():
-            render_settings.engine, scene.cycles.samples, scene.cycles.seed = 'CYCLES', COVERAGE_SAMPLES, seed
-            scene.cycles.use_denoising = scene.cycles.use_adaptive_sampling = False
-            render_settings.film_transparent, render_settings.filepath = True, str(path)
-            if hasattr(render_settings.image_settings, "media_type"):
-                render_settings.image_settings.media_type = 'MULTI_LAYER_IMAGE'
-            render_settings.image_settings.file_format = 'OPEN_EXR_MULTILAYER'
-            bpy.ops.render.render(write_still=True)
-    finally:
-        set_format(render_settings.image_settings, 'PNG')
-        render_settings.film_transparent, scene.cycles.max_bounces = False, bounces
-        for kind in _PASSES:
-            setattr(layer, f"use_pass_{kind}_color", False)
+    layer = bpy.context.view_layer
+    passes = [(layer, f"use_pass_{kind}_color", True) for kind in _PASSES]
+    with ground_as_holes(scene), changed((scene.cycles, "max_bounces", 0), *passes):
+        render(scene, path, COVERAGE_SAMPLES, seed, form='OPEN_EXR_MULTILAYER')
     parts = [OpenImageIO.ImageBuf(str(path), i, 0) for i in range(OpenImageIO.ImageBuf(str(path)).nsubimages)]
     named = {}
     for part in parts:
@@ -675,30 +617,24 @@ def albedo(scene: bpy.types.Scene, path: Path, seed: int = 0) -> NDArray[np.floa
 
 def coverage(scene: bpy.types.Scene, path: Path) -> NDArray[np.float32]:
     """How much of each pixel (height, width) is not ground or sky, 0 to 1."""
-    bounces = scene.cycles.max_bounces
-    scene.cycles.max_bounces = 0
-    try:
+    with changed((scene.cycles, "max_bounces", 0)):
         return silhouette(scene, path.with_suffix(".exr"), COVERAGE_SAMPLES)[..., 3]
-    finally:
-        scene.cycles.max_bounces = bounces
 
 
 @contextmanager
-def ground_as_holes() -> Iterator[None]:
-    """Make holes in the image of all ground; instances come out of ground, so it is its material that does it."""
+def ground_as_holes(scene: bpy.types.Scene) -> Iterator[None]:
+    """Make holes in the image of sky and ground; instances come out of ground, so it is its material that does it."""
     trees = [bpy.data.materials[name].node_tree for name in ("Meadow", "Forest floor")]
-    changed = []
+    before = []
     for tree in trees:
         output = next(node for node in tree.nodes if node.type == 'OUTPUT_MATERIAL')
         hole = tree.nodes.new("ShaderNodeHoldout")
-        changed.append((tree, output, hole, output.inputs["Surface"].links[0].from_socket))
+        before.append((tree, output, hole, output.inputs["Surface"].links[0].from_socket))
         tree.links.new(hole.outputs[0], output.inputs["Surface"])
-    color_mode = bpy.context.scene.render.image_settings.color_mode
-    bpy.context.scene.render.image_settings.color_mode = 'RGBA'
     try:
-        yield
+        with changed((scene.render, "film_transparent", True), (scene.render.image_settings, "color_mode", 'RGBA')):
+            yield
     finally:
-        bpy.context.scene.render.image_settings.color_mode = color_mode
-        for tree, output, hole, before in changed:
-            tree.links.new(before, output.inputs["Surface"])
+        for tree, output, hole, socket in before:
+            tree.links.new(socket, output.inputs["Surface"])
             tree.nodes.remove(hole)

@@ -26,7 +26,6 @@ TARGETS: Targets = {
     "over_5s": {"max": 0},
     "peak_mb": {"max": 2_000},
 }
-QUICK_TARGETS = TARGETS
 
 
 def run(quick: bool) -> dict[str, float]:

@@ -20,6 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from devtools import forms
+from examples import stage
 from tetflora_addon.blender.job.plant_mesh import plant_mesh, plant_parts, single_seed
 from tetflora_addon.compiled.flora import compile_species
 from tetflora_addon.species.catalog import load_species
@@ -38,7 +39,6 @@ PIXELS, SAMPLES, QUICK_SAMPLES = 1500, 16, 4
 HABIT = 1.0
 
 TARGETS: Targets = {"summer_off": {"max": 0.04}, "winter_off": {"max": 0.04}}
-QUICK_TARGETS: Targets = TARGETS
 
 
 def run(quick: bool) -> dict[str, float]:
@@ -47,7 +47,7 @@ def run(quick: bool) -> dict[str, float]:
     meshes, area = _variants(scene)
     diameter = forms.measured("birch", HABIT)["diameter"]
     scale = np.sqrt(4.0 * BASAL_AREA / (np.pi * STEMS)) / diameter
-    _camera(scene)
+    stage.camera(scene, (0.0, 0.0, 100.0), (0.0, 0.0, 0.0), (PIXELS, PIXELS), far=200.0, across=SEEN)
     size = SPREAD * np.random.default_rng(2).uniform(-1.0, 1.0, len(places := _places())) + 1.0
     size *= scale / np.sqrt(np.mean(size**2))
     found = {}
@@ -116,17 +116,3 @@ def _plant(
         scene.collection.objects.link(one)
         objects.append(one)
     return objects
-
-
-def _camera(scene: bpy.types.Scene) -> None:
-    """From above, without perspective, on an otherwise empty scene."""
-    for o in list(scene.objects):
-        bpy.data.objects.remove(o)
-    data = bpy.data.cameras.new("Above")
-    data.type, data.ortho_scale, data.clip_end = 'ORTHO', SEEN, 200.0
-    camera = bpy.data.objects.new("Above", data)
-    camera.location = (0.0, 0.0, 100.0)
-    scene.collection.objects.link(camera)
-    scene.camera = camera
-    scene.render.resolution_x = scene.render.resolution_y = PIXELS
-    scene.render.resolution_percentage = 100

@@ -50,7 +50,6 @@ TARGETS: Targets = {
     "peak_mb": {"max": 3000},
     "silhouette_px_max": {"max": 2.0},
 }
-QUICK_TARGETS: Targets = TARGETS
 
 
 @dataclass(frozen=True)

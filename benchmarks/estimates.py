@@ -33,7 +33,6 @@ SCENES = {
 QUALITIES = "DRAFT", "FINAL"
 
 TARGETS: Targets = {"estimate_ratio_max": {"max": 1.5}}
-QUICK_TARGETS = TARGETS
 
 
 def run(quick: bool) -> dict[str, float]:

@@ -34,7 +34,6 @@ import itertools
 import json
 import time
 from collections.abc import Iterable, Iterator
-from contextlib import contextmanager
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -44,7 +43,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from devtools.formats import set_format
-from tetflora_addon.blender.biomes import adding, files, library
+from examples import biomes, stage
+from tetflora_addon.blender.biomes import adding
 from tetflora_addon.blender.job import refine
 from tetflora_addon.blender.job.contents import compile_for, in_year, read_scene
 from tetflora_addon.blender.materials import snow
@@ -54,13 +54,12 @@ from tetflora_addon.blender.results.output import KIND, result_collections
 from tetflora_addon.blender.scene.camera import read_camera
 from tetflora_addon.blender.scene.fields import fields_of
 from tetflora_addon.blender.viewport import warnings
-from tetflora_addon.blender.worker import run_to_end
 from tetflora_addon.emission.plants import expanded_blocks
 from tetflora_addon.growth.hashing import child_key, key_of_seed
 
 from . import forest
-from .pictures import color_error, coverage, flip_map, read_picture, render, timed_render
-from .report import ROOT, Targets, Watch, cpu_s, forget_peak, peak_mb, records_of, setting, size_of
+from .pictures import changed, color_error, coverage, flip_map, read_picture, render, save_picture, timed_render
+from .report import ROOT, Targets, Watch, apart, cpu_s, forget_peak, peak_mb, setting, size_of
 
 FOLDER = ROOT / "out" / "exact"
 CASES = ("edge", "ridge", "eye", "low")
@@ -288,18 +287,14 @@ def _apart(
     threads: int = 0,
     quality: str = "FINAL",
 ) -> dict:
-    """What a process of its own prints."""
-    asked = asdict(spec) | {"what": what, "folder": str(folder), "kept": str(kept), "set": list(settings)}
-    asked |= {"compare": compare, "render": render, "quality": quality}
+    """What a process of its own measures."""
     own = {"TETFLORA_THREADS": str(threads)} if threads else {}
-    return records_of(["exact", "--one", json.dumps(asked)], **own)[-1]
+    folders = str(folder), str(kept)
+    return apart(measure, asdict(spec), what, *folders, list(settings), compare, render, quality, **own)
 
 
 def run(given: argparse.Namespace) -> dict[str, float] | None:
     """Measure everything, or some; quick: the edge in summer and in winter, in a small image, with two seeds."""
-    if given.one:
-        print(json.dumps(measure(json.loads(given.one))), flush=True)
-        return None
     if given.sheet:
         _show(given.out.resolve(), ROOT / "docs" / "images" / "exact.jpg")
         return None
@@ -361,7 +356,7 @@ def _speed(edge: Spec) -> dict[str, float]:
 def _biomes() -> dict[str, float]:
     """Sides of facets in each shipped biome, over what is set in *Final*, and whether qualities are in order."""
     ratios, ordered, figures = [], True, {}
-    for path in sorted((ROOT / "tetflora_addon" / "biomes").glob("*.json")):
+    for path in sorted(biomes.SHIPPED.glob("*.json")):
         spec = Spec(path.stem, (), size=FULL, seeds=0)
         found = [_apart(spec, "biome", FOLDER / f"biome-{path.stem}", FOLDER, quality=name) for name in QUALITIES]
         sides = [one["facet_px"] for one in found]
@@ -412,7 +407,6 @@ def line(found: dict) -> str:
 def options(parser: argparse.ArgumentParser) -> None:
     """What may be asked for beside everything."""
     add = parser.add_argument
-    add("--one", metavar="JSON", help=argparse.SUPPRESS)
     add("--cases", nargs="+", choices=CASES, help="only these")
     add("--seasons", nargs="+", choices=SEASONS, default=["summer"])
     add("--species", nargs="+", type=_species, default=[SPECIES[0]], metavar="NAME,NAME", help="woods of these species")
@@ -438,15 +432,15 @@ def _specs(given: argparse.Namespace) -> Iterator[Spec]:
         yield Spec(case, species, season, given.size, given.window, given.samples, given.seeds, given.distance)
 
 
-def build(scene: bpy.types.Scene, spec: dict) -> int:
+def build(scene: bpy.types.Scene, spec: Spec) -> int:
     """The wood of a case, its camera and light, on its day; how many plants there are."""
-    kind, species = spec["case"], tuple(spec["species"])
-    case = forest.Case(species, **({"side": _PATCH, "asked": spec["few"]} if spec["few"] else {}))
+    kind = spec.case
+    case = forest.Case(tuple(spec.species), **({"side": _PATCH, "asked": spec.few} if spec.few else {}))
     if kind == "ridge":
         case = replace(case, away=600.0, eye=60.0)
     elif kind == "eye":
-        case = replace(case, eye=1.7, inside=True, distance=spec["distance"])
-    planted = forest.build(scene, case, tuple(spec["size"]))
+        case = replace(case, eye=1.7, inside=True, distance=spec.distance)
+    planted = forest.build(scene, case, tuple(spec.size))
     if kind == "ridge":
         scene.camera.data.lens = 110.0
         scene.camera.data.clip_end = 5000.0
@@ -457,15 +451,13 @@ def build(scene: bpy.types.Scene, spec: dict) -> int:
         sun = next(o for o in scene.objects if o.type == 'LIGHT')
         sun.rotation_euler = _LOW_SUN - np.pi / 2.0, 0.0, 0.0
     year = scene.tetflora.year
-    year.enabled = spec["season"] != "summer"
+    year.enabled = spec.season != "summer"
     if year.enabled:
-        year.day, year.snow = _DAY, 1.0 if spec["season"] == "snow" else 0.0
-    if spec["window"]:
-        _crop(scene.render, spec["window"], spec["size"])
-    if spec["seeds"]:
-        few_seeds(scene, spec["seeds"])
-    for name, value in spec["set"]:
-        forest.set_named(scene.tetflora, name, value)
+        year.day, year.snow = _DAY, 1.0 if spec.season == "snow" else 0.0
+    if spec.window:
+        _crop(scene.render, spec.window, spec.size)
+    if spec.seeds:
+        few_seeds(scene, spec.seeds)
     bpy.context.view_layer.update()
     return planted
 
@@ -509,19 +501,18 @@ def _few(place: NDArray, number: int) -> NDArray[np.int32]:
     return (child_key(key_of_seed(east), north) % np.uint64(number)).astype(np.int32)
 
 
-def truth(scene: bpy.types.Scene, spec: dict, folder: Path) -> dict[str, float]:
+def truth(scene: bpy.types.Scene, spec: Spec, folder: Path) -> dict[str, float]:
     """Instances in place of all plants, rendered with two seeds of noise; seconds and memory."""
-    figures: dict[str, float] = {"planted": build(scene, spec)}
     forget_peak()
-    around = _AROUND if spec["case"] == "eye" else 0.0
-    built = forest.build_instances(scene, spec["seeds"], own=True, away=around)
-    figures |= {f"instances_{name}": value for name, value in built.items()}
+    around = _AROUND if spec.case == "eye" else 0.0
+    built = forest.build_instances(scene, spec.seeds, own=True, away=around)
+    figures = {f"instances_{name}": value for name, value in built.items()}
     for obj in [scene.objects["Wood"], *_expand(scene, around)]:
         obj[KIND] = "truth"  # not one of those that are holes where plants are not
     snow.fit(bpy.data.materials)
-    figures["instances_render_s"] = timed_render(scene, folder / "truth.png", spec["samples"], 0)
+    figures["instances_render_s"] = timed_render(scene, folder / "truth.png", spec.samples, 0)
     figures["instances_peak_mb"] = peak_mb()
-    timed_render(scene, folder / "again.png", spec["samples"], 1)
+    timed_render(scene, folder / "again.png", spec.samples, 1)
     _save_mask(folder / "covered.npy", coverage(scene, folder / "coverage.png", COVERAGE_SAMPLES))
     return figures
 
@@ -539,19 +530,21 @@ def _expand(scene: bpy.types.Scene, around: float) -> Iterator[bpy.types.Object]
         yield made
 
 
-def refined(scene: bpy.types.Scene, spec: dict, folder: Path, kept: Path) -> dict[str, float]:
+def refined(
+    scene: bpy.types.Scene, spec: Spec, folder: Path, kept: Path, compare: bool, render: bool
+) -> dict[str, float]:
     """What Refine makes, rendered, and how far it is from the truth in a folder."""
-    figures: dict[str, Any] = {"planted": build(scene, spec)} | _refined(scene, spec)
-    if spec["render"]:
+    figures = _refined(scene, spec)
+    if render:
         watch = Watch()
-        figures["render_s"] = timed_render(scene, folder / "refined.png", spec["samples"], 2)
+        figures["render_s"] = timed_render(scene, folder / "refined.png", spec.samples, 2)
         figures["peak_render_mb"] = max(watch.most, figures["peak_mb"])
-        if spec["compare"]:
+        if compare:
             figures |= compared(folder, kept, coverage(scene, folder / "coverage.png", COVERAGE_SAMPLES))
     return figures | _sides(scene, folder)
 
 
-def _refined(scene: bpy.types.Scene, spec: dict) -> dict[str, Any]:
+def _refined(scene: bpy.types.Scene, spec: Spec) -> dict[str, Any]:
     """Refine as renders do; seconds, memory of all processes, and what was made."""
     watch, begun, processor = Watch(), time.perf_counter(), cpu_s()
     statistics = refine.refine(scene, bpy.context.evaluated_depsgraph_get())
@@ -561,7 +554,7 @@ def _refined(scene: bpy.types.Scene, spec: dict) -> dict[str, Any]:
         "peak_mb": watch.most,
         "stages": {name: round(value, 2) for name, value in statistics.seconds.items()},
         "facet_pixels_said": statistics.facet_pixels,
-        **counted(_made(scene), spec["size"]),
+        **counted(_made(scene), spec.size),
     }
 
 
@@ -569,12 +562,11 @@ def _made(scene: bpy.types.Scene) -> list[bpy.types.Object]:
     return [o for c in result_collections(scene) for o in c.all_objects if o.data is not None]
 
 
-def biome(scene: bpy.types.Scene, spec: dict, folder: Path) -> dict[str, Any]:
+def biome(scene: bpy.types.Scene, spec: Spec, folder: Path, quality: str) -> dict[str, Any]:
     """A shipped biome on a hectare, seen at the height of the eye from the edge, in one of the qualities."""
-    chosen = files.read_biome(library.builtin_folder() / f"{spec['case']}.json")
+    chosen = biomes.read(spec.case)
     land = adding.make_land(scene, chosen.ground)
-    bpy.context.view_layer.update()
-    run_to_end(adding.add_biome_steps(scene, bpy.context.evaluated_depsgraph_get(), chosen, [land]))
+    biomes.add(scene, chosen, land)
     forest.add_light(scene)
     side = land.dimensions.y
     forest.add_camera(scene, forest.Case((), eye=_EYE, side=side))
@@ -585,26 +577,25 @@ def biome(scene: bpy.types.Scene, spec: dict, folder: Path) -> dict[str, Any]:
         eye[:2] = warnings.open_place(scene, eye, np.array([0.0, 1.0, 0.0]))[:2]
     scene.camera.location = eye
     scene.camera.rotation_euler = np.pi / 2.0, 0.0, 0.0
-    scene.render.resolution_x, scene.render.resolution_y = spec["size"]
+    scene.render.resolution_x, scene.render.resolution_y = spec.size
     scene.render.resolution_percentage = 100
-    scene.tetflora.refine_at_render, scene.tetflora.quality = False, spec["quality"]
+    scene.tetflora.refine_at_render, scene.tetflora.quality = False, quality
     bpy.context.view_layer.update()
     return {"facet_set": scene.tetflora.facet} | _refined(scene, spec) | _sides(scene, folder)
 
 
-def checked(scene: bpy.types.Scene, spec: dict, folder: Path) -> dict[str, float]:
+def checked(scene: bpy.types.Scene, spec: Spec, folder: Path) -> dict[str, float]:
     """Whether instances are the plants: a few of them as instances, beside the same expanded one by one."""
-    figures: dict[str, float] = {"planted": build(scene, spec)}
     scene.tetflora.expand_everything = True
     refine.refine(scene, bpy.context.evaluated_depsgraph_get())
     for name, seed in (("truth", 0), ("again", 1)):
-        timed_render(scene, folder / f"{name}.png", spec["samples"], seed)
+        timed_render(scene, folder / f"{name}.png", spec.samples, seed)
     _save_mask(folder / "covered.npy", covered := coverage(scene, folder / "coverage.png", COVERAGE_SAMPLES))
     refine.clear(scene)
-    forest.build_instances(scene, spec["seeds"], own=True)
+    forest.build_instances(scene, spec.seeds, own=True)
     snow.fit(bpy.data.materials)
-    timed_render(scene, folder / "refined.png", spec["samples"], 2)
-    return figures | compared(folder, folder, covered)
+    timed_render(scene, folder / "refined.png", spec.samples, 2)
+    return compared(folder, folder, covered)
 
 
 def _save_mask(path: Path, covered: NDArray[np.float32]) -> None:
@@ -636,8 +627,8 @@ def compared(folder: Path, kept: Path, covered: NDArray[np.float32]) -> dict[str
     shown = np.repeat(np.minimum(error, 1.0)[:, :, None], 3, axis=2)
     marks = 0.35 * np.repeat(luma(exact)[:, :, None], 3, axis=2)
     marks[bright], marks[dark] = (1.0, 0.3, 0.1), (0.1, 0.4, 1.0)
-    _save(folder / "sheet.png", np.concatenate([exact, found, shown], axis=1))
-    _save(folder / "blobs.png", np.concatenate([found, marks], axis=1))
+    save_picture(folder / "sheet.png", np.concatenate([exact, found, shown], axis=1))
+    save_picture(folder / "blobs.png", np.concatenate([found, marks], axis=1))
     flip, flip_noise = float(error[mask].mean()), float(noise[mask].mean())
     return {
         "flip": flip,
@@ -661,19 +652,7 @@ def _show(folder: Path, path: Path) -> None:
         rows.append(picture[:, : picture.shape[1] * 2 // 3])
     if not rows:
         raise SystemExit("No windows there: run exact with --size 1920x1080 --window 640x360 first")
-    _save(path, np.concatenate(rows), 'JPEG')
-
-
-def _save(path: Path, picture: NDArray[np.floating], form: str = 'PNG') -> None:
-    """Write an image (height, width, 3) as it is stored, top row first."""
-    height, width = picture.shape[:2]
-    image = bpy.data.images.new("sheet", width, height)
-    pixels = np.ones((height, width, 4), np.float32)
-    pixels[:, :, :3] = picture[::-1]
-    image.pixels.foreach_set(pixels.ravel())
-    image.filepath_raw, image.file_format = str(path), form
-    image.save(quality=80)
-    bpy.data.images.remove(image)
+    save_picture(path, np.concatenate(rows))
 
 
 def _sides(scene: bpy.types.Scene, folder: Path) -> dict[str, float]:
@@ -711,10 +690,8 @@ def _mark(mesh: bpy.types.Mesh, kind: str) -> None:
 def _side_material() -> bpy.types.Material:
     """Emits side, kind and depth, meters."""
     material = bpy.data.materials.new("Sides")
-    if not material.node_tree:  # before Blender 5.0 new materials have no nodes
-        material.use_nodes = True
+    stage.cleared(material)
     tree = material.node_tree
-    tree.nodes.clear()
     new, link = tree.nodes.new, tree.links.new
     packed, emitted, out = new("ShaderNodeCombineXYZ"), new("ShaderNodeEmission"), new("ShaderNodeOutputMaterial")
     for name, socket in ((_SIDE, "X"), (_KIND, "Y")):
@@ -734,7 +711,7 @@ def _attribute(tree: bpy.types.NodeTree, name: str) -> bpy.types.NodeSocket:
 def _seen(scene: bpy.types.Scene, path: Path, material: bpy.types.Material) -> NDArray[np.float32]:
     """What is emitted to the center of each pixel (height, width, 3), if everything were of a material."""
     layer, settings = bpy.context.view_layer, scene.render
-    with _changed(
+    with changed(
         (layer, "material_override", material),
         (settings, "film_transparent", True),
         (scene.cycles, "pixel_filter_type", 'BOX'),
@@ -747,25 +724,20 @@ def _seen(scene: bpy.types.Scene, path: Path, material: bpy.types.Material) -> N
     return read_picture(path)[:, :, :3]
 
 
-@contextmanager
-def _changed(*changes: tuple[Any, str, Any]) -> Iterator[None]:
-    before = [(owner, name, getattr(owner, name)) for owner, name, _ in changes]
-    for owner, name, value in changes:
-        setattr(owner, name, value)
-    try:
-        yield
-    finally:
-        for owner, name, value in before:
-            setattr(owner, name, value)
-
-
-def measure(spec: dict) -> dict[str, Any]:
+def measure(
+    wood: dict, what: str, folder: str, kept: str, settings: list, compare: bool, render: bool, quality: str
+) -> dict[str, Any]:
     """Make the picture that is asked for in an empty file; its figures."""
-    folder, kept = Path(spec["folder"]), Path(spec["kept"])
-    folder.mkdir(parents=True, exist_ok=True)
-    scene = bpy.context.scene
-    if spec["what"] == "truth":
-        return truth(scene, spec, kept)
-    if spec["what"] == "refined":
-        return refined(scene, spec, folder, kept)
-    return (biome if spec["what"] == "biome" else checked)(scene, spec, folder)
+    spec, scene, own = Spec(**wood), bpy.context.scene, Path(folder)
+    own.mkdir(parents=True, exist_ok=True)
+    if what == "biome":
+        return biome(scene, spec, own, quality)
+    figures: dict[str, Any] = {"planted": build(scene, spec)}
+    for name, value in settings:
+        forest.set_named(scene.tetflora, name, value)
+    bpy.context.view_layer.update()
+    if what == "truth":
+        return figures | truth(scene, spec, Path(kept))
+    if what == "check":
+        return figures | checked(scene, spec, own)
+    return figures | refined(scene, spec, own, Path(kept), compare, render)

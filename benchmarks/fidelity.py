@@ -31,10 +31,11 @@ from pathlib import Path
 import bpy
 import numpy as np
 from numpy.typing import NDArray
-from PIL import Image, ImageDraw, ImageFont
+from PIL import Image
 
 from devtools import session
 from examples import stands
+from examples.paper.pictures import save_sheet
 from tetflora_addon.blender import compat
 
 from .pictures import color_error, coverage, flip_map, linear_light, read_picture, render, timed_refine
@@ -70,8 +71,6 @@ SHEET_ROWS = (
     (200, "side", "cycles"),
     (200, "side", "eevee"),
 )
-SHEET_BYTES = 500_000
-_LABEL, _TEXT, _PAPER = 18, (30, 30, 30), (245, 245, 245)
 
 TARGETS: Targets = {
     "flip_mean": {"max": 0.05},
@@ -436,40 +435,20 @@ def make_sheet(folder: Path, target: Path) -> None:
     if not record.exists():
         raise FileNotFoundError(f"{record} is missing: run python -m benchmarks fidelity first")
     frames = json.loads(record.read_text())
-    columns = [EXPANDED, *dict.fromkeys(f["form"] for f in frames)]
-    font = ImageFont.load_default(13)
-    rows = []
+    columns, cells = [EXPANDED, *dict.fromkeys(f["form"] for f in frames)], []
     for pixels, light, engine in SHEET_ROWS:
         here = [f for f in frames if (f["pixels"], f["light"], f["engine"]) == (pixels, light, engine)]
-        if not here:
-            continue
-        each = min(f["each"] for f in here)  # one plant of each species where that was rendered
-        here = [f for f in here if f["each"] == each]
-        paths = [picture_path(folder, pixels, each, light, engine, form) for form in columns]
-        cells = [_scaled(Image.open(path).convert("RGB")) if path.exists() else None for path in paths]
+        each = min((f["each"] for f in here), default=0)  # one plant of each species where that was rendered
         name = {"cycles": "Cycles", "eevee": "EEVEE"}[engine]
-        labels = [f"{name}, {pixels} pixels high, {light}: expanded"]
-        for form in columns[1:]:
-            flips = [f["flip"] for f in here if f["form"] == form]
-            mean = f": FLIP {sum(flips) / len(flips):.3f}" if flips else ""
-            labels.append(form.replace("_", " ").capitalize() + mean)
-        rows.append((labels, cells))
-    heights = [_LABEL + max(c.height for c in cells if c is not None) + 4 for _, cells in rows]
-    sheet = Image.new("RGB", (len(columns) * (SHEET_WIDTH + 4), sum(heights)), _PAPER)
-    draw = ImageDraw.Draw(sheet)
-    top = 0
-    for (labels, cells), height in zip(rows, heights, strict=True):
-        for column, (label, cell) in enumerate(zip(labels, cells, strict=True)):
-            if cell is not None:
-                draw.text((column * (SHEET_WIDTH + 4) + 2, top + 1), label, fill=_TEXT, font=font)
-                sheet.paste(cell, (column * (SHEET_WIDTH + 4), top + _LABEL))
-        top += height
+        for form in columns if here else ():
+            flips = [f["flip"] for f in here if (f["form"], f["each"]) == (form, each)]
+            label = form.replace("_", " ").capitalize() + (f": FLIP {np.mean(flips):.3f}" if flips else "")
+            path = picture_path(folder, pixels, each, light, engine, form)
+            picture = _scaled(Image.open(path).convert("RGB")) if path.exists() else None
+            first = f"{name}, {pixels} pixels high, {light}: expanded"
+            cells.append((picture, first if form == EXPANDED else label))
     target.parent.mkdir(parents=True, exist_ok=True)
-    for quality in (92, 88, 82, 75, 65):
-        sheet.save(target, quality=quality, subsampling=0)
-        if target.stat().st_size <= SHEET_BYTES:
-            break
-    print(f"{target}: {sheet.width} by {sheet.height}, {target.stat().st_size / 1e3:.0f} kB")
+    save_sheet(cells, len(columns), target)
 
 
 def _scaled(picture: Image.Image) -> Image.Image:

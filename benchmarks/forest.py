@@ -29,7 +29,7 @@ import bpy
 import numpy as np
 from mathutils import Vector
 
-from examples import million, stage
+from examples import million, stage, stands
 from tetflora_addon import memory
 from tetflora_addon.blender import worker
 from tetflora_addon.blender.job import refine
@@ -37,9 +37,7 @@ from tetflora_addon.blender.job.contents import compile_for, in_year, read_scene
 from tetflora_addon.blender.job.forecast import forecast
 from tetflora_addon.blender.job.plant_mesh import plant_mesh, plant_parts, single_seed
 from tetflora_addon.blender.placing.first_forest import sky
-from tetflora_addon.compiled.flora import compile_species
 from tetflora_addon.emission.budget import Detail
-from tetflora_addon.emission.plants import expanded_blocks
 from tetflora_addon.growth.seeds import Seeds
 from tetflora_addon.jobs import Progress
 from tetflora_addon.refinement.decisions import Decision
@@ -241,15 +239,9 @@ def case_of(name: str) -> Case:
     return Case((name,))
 
 
-def height_of(identifier: str) -> float:
-    """Height of one plant of a species, meters."""
-    flora = compile_species([catalog.load_species(identifier)])
-    return max(float(b.buffers.positions[:, 2].max()) for b in expanded_blocks(flora, single_seed(identifier, 1)))
-
-
 def trees() -> tuple[str, ...]:
     """Species of the catalog that are trees."""
-    return tuple(name for name in catalog.list_species() if height_of(name) >= TREE)
+    return tuple(name for name in catalog.list_species() if stands.height_of(name, 1) >= TREE)
 
 
 def build(scene: bpy.types.Scene, case: Case, size: tuple[int, int] = (WIDTH, HEIGHT)) -> int:
@@ -477,17 +469,9 @@ def _places(seeds: Seeds, each: int, own: bool) -> bpy.types.Mesh:
 
 def _variant_nodes(variants: bpy.types.Collection) -> bpy.types.GeometryNodeTree:
     """Vertices in, instances of the members of a collection out."""
-    tree = bpy.data.node_groups.new("Instances", 'GeometryNodeTree')
-    tree.interface.new_socket("Geometry", in_out='INPUT', socket_type='NodeSocketGeometry')
-    tree.interface.new_socket("Geometry", in_out='OUTPUT', socket_type='NodeSocketGeometry')
+    tree, given, placed, made = stage.instancing("Instances", variants)
     new, link = tree.nodes.new, tree.links.new
-    given, made = new("NodeGroupInput"), new("NodeGroupOutput")
-    source, placed = new("GeometryNodeCollectionInfo"), new("GeometryNodeInstanceOnPoints")
-    source.inputs["Collection"].default_value = variants
-    source.inputs["Separate Children"].default_value = source.inputs["Reset Children"].default_value = True
-    placed.inputs["Pick Instance"].default_value = True
     link(given.outputs[0], placed.inputs["Points"])
-    link(source.outputs[0], placed.inputs["Instance"])
     for name, kind, socket in _SOCKETS:
         stored = new("GeometryNodeInputNamedAttribute")
         stored.data_type = kind

@@ -18,8 +18,9 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
-from devtools import forms
+from devtools import forms, session
 from devtools.leaf_area import allometry, by_size
+from examples import stage
 from tetflora_addon.blender.job.plant_mesh import plant_mesh, plant_parts, single_seed
 from tetflora_addon.blender.scene.ages import kind_species
 from tetflora_addon.compiled.flora import compile_species
@@ -42,7 +43,6 @@ EXPANDED, PIXELS, SAMPLES = 3, 480, 8
 _OUTSIDE = 0.02
 
 TARGETS: Targets = {"out_of_range": {"max": 0}, "drawn_against_grid_max": {"max": 0.05}}
-QUICK_TARGETS: Targets = TARGETS
 QUICK_SPECIES = ("beech", "spruce", "scots_pine")
 
 
@@ -76,10 +76,6 @@ def run(quick: bool) -> dict[str, object]:
             for name, gap in gaps.items()
         ],
     }
-
-
-def _rounded(row: dict[str, object]) -> dict[str, object]:
-    return {key: round(value, 3) if isinstance(value, float) else value for key, value in row.items()}
 
 
 def drawn_against_grid(identifier: str, years: int) -> float:
@@ -135,22 +131,15 @@ def expanded_off(identifier: str) -> float:
 
 def crown_gap(identifier: str) -> float:
     """Share of the sky that is seen through the crown of a full-grown tree."""
+    session.clean_file()
     scene, species = bpy.context.scene, load_species(identifier)
-    for o in list(scene.objects):
-        bpy.data.objects.remove(o)
     parts = plant_parts(compile_species([species]), single_seed(identifier, 0))
     o = bpy.data.objects.new("Tree", plant_mesh(scene, identifier, species, parts))
     o["tetflora_kind"] = "bark"
     scene.collection.objects.link(o)
     height = max(corner[2] for corner in o.bound_box)
-    data = bpy.data.cameras.new("Beside")
-    data.type, data.ortho_scale, data.clip_end = 'ORTHO', 1.5 * height, 400.0
-    camera = bpy.data.objects.new("Beside", data)
-    camera.location, camera.rotation_euler = (0.0, -200.0, 0.5 * height), (np.pi / 2, 0.0, 0.0)
-    scene.collection.objects.link(camera)
-    scene.camera = camera
-    scene.render.resolution_x = scene.render.resolution_y = PIXELS
-    scene.render.resolution_percentage = 100
+    middle = 0.5 * height
+    stage.camera(scene, (0.0, -200.0, middle), (0.0, 0.0, middle), (PIXELS, PIXELS), far=400.0, across=3.0 * middle)
     with tempfile.TemporaryDirectory() as folder:
         seen = coverage(scene, Path(folder) / "crown.png", SAMPLES)
     base = forms.measured(identifier)["crown_base"] * height

@@ -3,7 +3,7 @@
 """Light under grown woods at the height of the eye, at noon, beside what is published of such stands.
 
     python -m benchmarks light_inside [--quick]
-    python -m benchmarks light_inside --wood beech --as refined     # one, as a line of JSON
+    python -m benchmarks light_inside --call measure '["beech", "refined", false]'    # one, as a line of JSON
 
 A pure stand grows on a square whose sides meet; with copies of it on all sides it goes on as far as light comes from.
 Cycles renders what arrives from above at a dark plane at the height of the eye, over what arrives there without plants:
@@ -21,10 +21,7 @@ A square that is small for want of memory has few trees, and the light varies fr
 
 from __future__ import annotations
 
-import argparse
-import json
 import tempfile
-from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -43,7 +40,7 @@ from tetflora_addon.stands.grow import Records, StandSettings, begun
 from tetflora_addon.stands.site import StandSite, StandSpecies, StandTraits
 
 from .pictures import read_picture, render, timed_refine
-from .report import ROOT, Targets, peak_mb, records_of
+from .report import Targets, apart, peak_mb, published
 
 WAYS = ("expanded", "refined")
 QUICK_WOODS = ("scots_pine",)
@@ -57,31 +54,20 @@ DENSITY, ELEVATION = 2500.0, 60.0
 PIXELS, SAMPLES, QUICK_SAMPLES = 96, 64, 16
 #: Part of the light that the plane reflects, as litter does.
 _PLANE = 0.1
-DATA = ROOT / "tests" / "data" / "light_inside.json"
+DATA = "light_inside"
 
 TARGETS: Targets = {"light_out_of_range": {"max": 0}, "refined_off_max": {"max": 0.15}}
-QUICK_TARGETS: Targets = TARGETS
 
 
-def options(parser: argparse.ArgumentParser) -> None:
-    """What may be asked for beside everything."""
-    parser.add_argument("--wood", choices=published()["woods"], help="only one, as a line of JSON")
-    parser.add_argument("--as", dest="way", choices=WAYS, default=WAYS[0])
-    parser.add_argument("--picture", type=Path, metavar="PATH", help="render what the eye sees, ahead and upwards")
-
-
-def run(given: argparse.Namespace) -> dict[str, object] | None:
+def run(quick: bool) -> dict[str, object]:
     """Light under each wood; ``table`` has a row for each: species, years, published, model, expanded, refined."""
-    if given.wood:
-        print(json.dumps(measure(given.wood, given.way, given.quick, given.picture)), flush=True)
-        return None
-    more, rows = ["--quick"] if given.quick else [], []
-    for name in QUICK_WOODS if given.quick else published()["woods"]:
+    rows = []
+    for name in QUICK_WOODS if quick else published(DATA)["woods"]:
         row = {}
         for way in WAYS:
-            row |= records_of(["light_inside", "--wood", name, "--as", way, *more])[-1]
-        low, high = published()["woods"][name]["light"]
-        most = published()["tolerance"]
+            row |= apart(measure, name, way, quick)
+        low, high = published(DATA)["woods"][name]["light"]
+        most = published(DATA)["tolerance"]
         row |= {"published": [low, high], "within": low * (1.0 - most) <= row["expanded"] <= high * (1.0 + most)}
         rows.append(row)
     return {
@@ -92,22 +78,16 @@ def run(given: argparse.Namespace) -> dict[str, object] | None:
     }
 
 
-@cache
-def published() -> dict[str, Any]:
-    """What is published."""
-    return json.loads(DATA.read_text(encoding="utf-8"))
-
-
-def measure(name: str, way: str, quick: bool, picture: Path | None = None) -> dict[str, Any]:
+def measure(name: str, way: str, quick: bool) -> dict[str, Any]:
     """Light under a wood over that in the open, of plants that are expanded or refined; what the simulation has."""
-    found = [square(name, way, quick, seed, picture) for seed in range(SQUARES if name in SMALLER else 1)]
+    found = [square(name, way, quick, seed) for seed in range(SQUARES if name in SMALLER else 1)]
     means = {key: float(np.mean([one[key] for one in found])) for key in found[0]}
     return {"species": name, **means, "each": [round(one[way], 4) for one in found]}
 
 
-def square(name: str, way: str, quick: bool, seed: int, picture: Path | None = None) -> dict[str, float]:
+def square(name: str, way: str, quick: bool, seed: int) -> dict[str, float]:
     """What is measured of one stand."""
-    scene, years = bpy.context.scene, published()["woods"][name]["years"]
+    scene, years = bpy.context.scene, published(DATA)["woods"][name]["years"]
     for obj in list(scene.objects):
         bpy.data.objects.remove(obj)
     side = SMALLER.get(name, SIDE)
@@ -131,8 +111,6 @@ def square(name: str, way: str, quick: bool, seed: int, picture: Path | None = N
                 scene.collection.objects.link(copy)
     samples = QUICK_SAMPLES if quick else SAMPLES
     with tempfile.TemporaryDirectory() as folder:
-        if picture:
-            pictures(scene, picture, samples, side)
         plane_below(scene, side)
         under = arriving(scene, Path(folder) / "under.exr", samples)
         direct = arriving(scene, Path(folder) / "direct.exr", samples, 0)
@@ -189,31 +167,11 @@ def planted(name: str, records: Records, places: NDArray[np.float64]) -> bpy.typ
     return field
 
 
-def pictures(scene: bpy.types.Scene, path: Path, samples: int, side: float) -> None:
-    """Render what the eye sees over dull ground: ahead, and with another ending of the name upwards."""
-    ground = stage.ground(3.0 * side, (0.08, 0.06, 0.04))
-    scene.view_settings.exposure = 2.0
-    render(scene, path, samples)
-    before = scene.camera.matrix_world.copy()
-    stage.look(scene, (0.0, 0.0, EYE), (0.0, 0.1, 10.0))
-    scene.camera.data.lens, scene.view_settings.exposure = 18.0, 0.0
-    render(scene, path.with_stem(f"{path.stem}_up"), samples)
-    scene.camera.matrix_world, scene.camera.data.lens = before, 35.0
-    bpy.data.objects.remove(ground)
-
-
 def plane_below(scene: bpy.types.Scene, side: float) -> None:
     """A dark plane at the height of the eye below the square, and a camera close above that looks down at it."""
     plane = stage.ground(side, (_PLANE,) * 3)
     plane.location.z = EYE
-    data = bpy.data.cameras.new("Below")
-    data.type, data.ortho_scale, data.clip_start, data.clip_end = 'ORTHO', side, 0.001, 0.1
-    camera = bpy.data.objects.new("Below", data)
-    camera.location = 0.0, 0.0, EYE + 0.02
-    scene.collection.objects.link(camera)
-    scene.camera = camera
-    scene.render.resolution_x = scene.render.resolution_y = PIXELS
-    scene.render.resolution_percentage = 100
+    stage.camera(scene, (0.0, 0.0, EYE + 0.02), (0.0, 0.0, EYE), (PIXELS, PIXELS), near=0.001, far=0.1, across=side)
 
 
 def arriving(scene: bpy.types.Scene, path: Path, samples: int, bounces: int = 12) -> NDArray[np.float32]:

@@ -2,8 +2,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Whether *Max Memory* holds: the sum of what Blender and its other processes hold, refinement and render together.
 
-    python -m benchmarks limits [--quick]                     # everything, with targets
-    python -m benchmarks limits --case birch --gigabytes 2    # one case, as a line of JSON
+    python -m benchmarks limits [--quick]                        # everything, with targets
+    python -m benchmarks limits --call measure '["birch", 2]'    # one case, as a line of JSON
 
 Each case is a process of its own with a camera at the height of eyes in the middle of its plants. Memory is looked at
 fifty times a second; pages that processes share count for each of them. At the end *Expand Everything* has to be
@@ -12,14 +12,12 @@ refused before anything of it is made.
 
 from __future__ import annotations
 
-import argparse
-import json
 import tempfile
 from pathlib import Path
 
 import numpy as np
 
-from .report import Targets, Watch, records_of
+from .report import Targets, Watch, apart
 
 #: Plants of a stand of each species on a square of so many meters, or the name of a biome.
 STANDS = {"birch": 300, "spruce": 200}
@@ -32,21 +30,12 @@ TARGETS: Targets = {"limit_ratio_max": {"max": 1.0}, "expanded_refused": {"min":
 QUICK_TARGETS: Targets = {**TARGETS, "expanded_refused": {"min": 3}}
 
 
-def options(parser: argparse.ArgumentParser) -> None:
-    """What may be asked for beside everything."""
-    parser.add_argument("--case", choices=(*STANDS, BIOME), help="only this, as a line of JSON")
-    parser.add_argument("--gigabytes", type=float, default=LIMITS[0])
-
-
-def run(given: argparse.Namespace) -> dict[str, float] | None:
+def run(quick: bool) -> dict[str, float]:
     """Measure all cases."""
-    if given.case:
-        print(json.dumps(measure(given.case, given.gigabytes)), flush=True)
-        return None
     found: dict[str, float] = {"limit_ratio_max": 0.0, "expanded_refused": 0, "expanded_growth_mb": 0.0}
     for name in (*STANDS, BIOME):
-        for limit in QUICK_LIMITS if given.quick else LIMITS:
-            (case,) = records_of(["limits", "--case", name, "--gigabytes", str(limit)])
+        for limit in QUICK_LIMITS if quick else LIMITS:
+            case = apart(measure, name, limit)
             found[f"{name}_{limit:g}_ratio"] = case["ratio"]
             found["limit_ratio_max"] = max(found["limit_ratio_max"], case["ratio"])
             found["expanded_refused"] += case["refused"]
@@ -94,9 +83,9 @@ def _plant(scene, name: str) -> None:
     """Plants around a camera."""
     import bpy
 
+    from examples import biomes
     from tests.blender.scenes import add_camera, add_plant
-    from tetflora_addon.blender.biomes import adding, files, library
-    from tetflora_addon.blender.worker import run_to_end
+    from tetflora_addon.blender.biomes import adding
 
     if name in STANDS:
         place = np.random.default_rng(1).uniform(-SIDE / 2, SIDE / 2, (STANDS[name], 2))
@@ -104,10 +93,9 @@ def _plant(scene, name: str) -> None:
             add_plant(f"plant {number}", name, seed=number, location=(x, y, 0.0))
         add_camera(location=(0.0, 0.0, EYES))
         return
-    biome = files.read_biome(library.builtin_folder() / f"{name}.json")
+    biome = biomes.read(name)
     land = adding.make_land(scene, biome.ground)
-    bpy.context.view_layer.update()
-    run_to_end(adding.add_biome_steps(scene, bpy.context.evaluated_depsgraph_get(), biome, [land]))
+    biomes.add(scene, biome, land)
     depsgraph = bpy.context.evaluated_depsgraph_get()
     middle = sum((np.array(land.matrix_world @ land.data.vertices[i].co) for i in (0, -1)), np.zeros(3)) / 2.0
     _, at, *_ = scene.ray_cast(depsgraph, (*middle[:2], 1e4), (0.0, 0.0, -1.0))

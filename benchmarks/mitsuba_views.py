@@ -4,7 +4,7 @@
 
     python -m benchmarks.mitsuba_views SET.obj POINTS.npy ALPHA.npy
 
-Points (n, 3) are around all plants; alpha (views, h, w) has the bottom row first.
+Points (n, 3) are around all plants; alpha (views, h, w) has the top row first.
 """
 
 from __future__ import annotations
@@ -48,7 +48,7 @@ def main(path: Path, points: NDArray) -> NDArray:
             "sampler": {"type": "independent", "sample_count": SAMPLES},
         }
         image = np.array(mitsuba.render(world, sensor=mitsuba.load_dict(sensor)))
-        made.append(image[::-1, :, 3])
+        made.append(image[:, :, 3])
     return np.array(made)
 
 

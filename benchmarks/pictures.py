@@ -5,13 +5,17 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import bpy
 import flip_evaluator
 import numpy as np
 from numpy.typing import NDArray
+from PIL import Image
 
 from devtools.formats import set_format
 from tetflora_addon.blender.job import refine
@@ -88,6 +92,24 @@ def render(
     bpy.ops.render.render(write_still=True)
 
 
+@contextmanager
+def changed(*changes: tuple[Any, str, Any]) -> Iterator[None]:
+    """While it lasts, properties have other values: owners, names, values."""
+    before = [(owner, name, getattr(owner, name)) for owner, name, _ in changes]
+    for owner, name, value in changes:
+        setattr(owner, name, value)
+    try:
+        yield
+    finally:
+        for owner, name, value in before:
+            setattr(owner, name, value)
+
+
+def save_picture(path: Path, picture: NDArray[np.floating]) -> None:
+    """Write an image (height, width) or (height, width, 3), 0 to 1 as it is stored, with 8 bits, top row first."""
+    Image.fromarray(np.round(255.0 * np.clip(picture, 0.0, 1.0)).astype(np.uint8)).save(path, quality=80)
+
+
 def timed_refine(scene: bpy.types.Scene, **settings: object) -> tuple[object, float]:
     """Refine with some settings of the scene changed; returns the statistics and the seconds."""
     for name, value in settings.items():
@@ -126,15 +148,11 @@ def coverage(scene: bpy.types.Scene, path: Path, samples: int, engine: str = 'CY
     others = [
         o for o in scene.objects if o.type in {'MESH', 'POINTCLOUD'} and "tetflora_kind" not in o and not o.is_holdout
     ]
-    before = scene.render.film_transparent, scene.render.image_settings.color_mode, scene.cycles.max_bounces
-    try:
-        for o in others:
-            o.is_holdout = True
-        scene.render.film_transparent, scene.render.image_settings.color_mode = True, 'RGBA'
-        scene.cycles.max_bounces = 0
+    with changed(
+        *((o, "is_holdout", True) for o in others),
+        (scene.render, "film_transparent", True),
+        (scene.render.image_settings, "color_mode", 'RGBA'),
+        (scene.cycles, "max_bounces", 0),
+    ):
         render(scene, path, samples, engine=engine)
-    finally:
-        for o in others:
-            o.is_holdout = False
-        scene.render.film_transparent, scene.render.image_settings.color_mode, scene.cycles.max_bounces = before
     return read_picture(path)[:, :, 3]

@@ -11,8 +11,6 @@ same way, with the right mixture but other individuals, and species by chance.
 
 from __future__ import annotations
 
-import argparse
-import json
 import random
 import tempfile
 import time
@@ -33,7 +31,7 @@ from tetflora_addon.emission.plants import expanded_blocks
 from tetflora_addon.geodata.inventories import preview
 from tetflora_addon.growth.seeds import Seeds
 
-from .report import Targets, records_of
+from .report import Targets, apart
 
 TREES, QUICK_TREES = 100_000, 10_000
 #: Trees that are grown in full, and those of the stand.
@@ -178,14 +176,14 @@ def canopy(folder: Path, side: int) -> dict[str, float]:
     return out | {"chm_bias_m": float((made - given).mean())}
 
 
-def mutate(number: int, folder: Path) -> dict[str, float]:
+def mutate(number: int, folder: str) -> dict[str, float]:
     """Import so many broken files of each kind through their operators; what is refused must leave nothing behind."""
     counts, slowest = {"imported": 0, "refused": 0, "bad": 0}, 0.0
     kinds = list(files.FILES)
     session.clean_file()
     for seed in range(number * len(kinds)):
         kind = kinds[seed % len(kinds)]
-        operator, path = files.write(folder, kind, files.mutated(random.Random(seed), files.FILES[kind][2]))
+        operator, path = files.write(Path(folder), kind, files.mutated(random.Random(seed), files.FILES[kind][2]))
         before = _counted()
         start = time.monotonic()
         try:
@@ -206,21 +204,13 @@ def _counted() -> list[int]:
     return [*(len(getattr(bpy.data, name)) for name in lists), len(bpy.context.scene.keys())]
 
 
-def options(parser: argparse.ArgumentParser) -> None:
-    """What may be asked for beside everything."""
-    parser.add_argument("--mutate", type=int, metavar="NUMBER", help="only so many broken files of each kind")
-
-
-def run(given: argparse.Namespace) -> dict[str, Any] | None:
+def run(quick: bool) -> dict[str, Any]:
     """The figures."""
     out: dict[str, Any] = {}
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        if given.mutate:
-            print(json.dumps(mutate(given.mutate, folder)), flush=True)
-            return None
         path = folder / "trees.csv"
-        path.write_text(inventory(QUICK_TREES if given.quick else TREES, np.random.default_rng(1)))
+        path.write_text(inventory(QUICK_TREES if quick else TREES, np.random.default_rng(1)))
         out |= inventories.figures()
         found = maps.figures()
         out |= {key: out[key] + found[key] for key in found}
@@ -231,11 +221,11 @@ def run(given: argparse.Namespace) -> dict[str, Any] | None:
         start = time.monotonic()
         bpy.ops.tetflora.import_inventory(filepath=str(path))
         out["inventory_s"] = time.monotonic() - start
-        out |= refined_sizes(QUICK_SAMPLE if given.quick else SAMPLE)
-        out |= canopy(folder, QUICK_STAND if given.quick else STAND)
+        out |= refined_sizes(QUICK_SAMPLE if quick else SAMPLE)
+        out |= canopy(folder, QUICK_STAND if quick else STAND)
         # A process of its own, so that a crash is one figure and not the end of all.
-        number = QUICK_MUTATED if given.quick else MUTATED
+        number = QUICK_MUTATED if quick else MUTATED
         out |= {"mutated_files": float(number * len(files.FILES)), "mutated_bad": 1.0}
         with suppress(RuntimeError):
-            out |= records_of(["places", "--mutate", str(number)], timeout=1800)[-1]
+            out |= apart(mutate, number, str(folder), timeout=1800)
     return out

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from devtools import session
 from tests.blender.renders import EEVEE_SAMPLES, few_directions
 from tests.blender.scenes import add_camera, add_plant, depsgraph
-from tetflora_addon.blender.attributes import image_pixels
+from tetflora_addon.blender import compat
 from tetflora_addon.blender.export.forest import ExportOrder, export_steps, kinds_of, variants_of
 from tetflora_addon.blender.results.leaf_objects import materials_of
 from tetflora_addon.blender.results.meshes import write_mesh
@@ -29,7 +29,7 @@ from tetflora_addon.blender.scene.plants import read_plants
 from tetflora_addon.blender.species.edits import species_for
 from tetflora_addon.blender.worker import run_to_end
 
-from .pictures import render
+from .pictures import read_picture, render
 from .side_views import eyes, frame_of
 
 #: Side of a picture, pixels; samples; polygons of the level that is shown.
@@ -95,7 +95,7 @@ def _color(points: NDArray, folder: Path, engine: str) -> NDArray:
 
 
 def pictures(points: NDArray, path: Path, engine: str = 'CYCLES', number: int = 4, side: int = _SIDE) -> list[NDArray]:
-    """Pictures (h, w, 4) of the scene around points, in linear RGB and alpha."""
+    """Pictures (h, w, 4) of the scene around points, in linear RGB and alpha, top row first."""
     scene = bpy.context.scene
     _light(scene)
     few_directions(scene.world)
@@ -115,9 +115,7 @@ def pictures(points: NDArray, path: Path, engine: str = 'CYCLES', number: int = 
         scene.camera.location = middle + 3.0 * camera.ortho_scale * eye
         scene.camera.rotation_euler = Vector(-eye).to_track_quat('-Z', 'Y').to_euler()
         render(scene, path, samples, engine=engine, form='OPEN_EXR')
-        image = bpy.data.images.load(str(path))
-        made.append(image_pixels(image).astype(np.float64))
-        bpy.data.images.remove(image)
+        made.append(read_picture(path).astype(np.float64))
     return made
 
 
@@ -127,9 +125,7 @@ def _light(scene: bpy.types.Scene) -> None:
     sun.rotation_euler = (np.radians(45.0), 0.0, 0.0)
     scene.collection.objects.link(sun)
     scene.world = bpy.data.worlds.new("sky")
-    if scene.world.node_tree is None:
-        scene.world.use_nodes = True
-    tree = scene.world.node_tree
+    tree = compat.shader_tree(scene.world)
     height, mix, place = (tree.nodes.new(f"ShaderNode{kind}") for kind in ("SeparateXYZ", "MixRGB", "TexCoord"))
     above = tree.nodes.new("ShaderNodeMath")
     above.operation = 'GREATER_THAN'

@@ -12,9 +12,11 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import suppress
+from functools import cache
 from pathlib import Path
+from typing import Any
 
 ROOT = Path(__file__).resolve().parent.parent
 CLEAR_PEAK = Path("/proc/self/clear_refs")
@@ -108,6 +110,21 @@ def records_of(words: list[str], timeout: float = 3600.0, **variables: str) -> l
     return [json.loads(line) for line in lines]
 
 
+def apart(function: Callable[..., dict], *given: object, timeout: float = 3600.0, **variables: str) -> dict:
+    """What a function of a benchmark returns in a process of its own; see `records_of`.
+
+    What it is given and what it returns has to be what JSON can tell.
+    """
+    name = function.__module__.rpartition(".")[2]
+    return records_of([name, "--call", function.__name__, json.dumps(given)], timeout, **variables)[-1]
+
+
+@cache
+def published(name: str) -> dict[str, Any]:
+    """What ``tests/data`` has of that name."""
+    return json.loads((ROOT / "tests" / "data" / f"{name}.json").read_text(encoding="utf-8"))
+
+
 def size_of(text: str) -> tuple[int, int]:
     """Width and height in a word: ``960x540``."""
     width, height = text.lower().split("x")
@@ -133,15 +150,19 @@ def machine() -> str:
 
 def commit() -> str:
     """Commit of the repository, with a plus sign where files are changed; empty outside of a repository."""
-    try:
-        return _git("rev-parse", "--short", "HEAD") + ("+" if _git("status", "--porcelain", "-uno") else "")
-    except (OSError, subprocess.CalledProcessError):
-        return ""
+    return head() + ("+" if _git("status", "--porcelain", "-uno") else "")
+
+
+def head() -> str:
+    """Commit of the repository; empty outside of one."""
+    return _git("rev-parse", "--short", "HEAD")
 
 
 def _git(*words: str) -> str:
-    done = subprocess.run(["git", "-C", str(ROOT), *words], capture_output=True, text=True, check=True)
-    return done.stdout.strip()
+    with suppress(OSError, subprocess.CalledProcessError):
+        done = subprocess.run(["git", "-C", str(ROOT), *words], capture_output=True, text=True, check=True)
+        return done.stdout.strip()
+    return ""
 
 
 def report(name: str, figures: dict[str, float], targets: Targets) -> dict:

@@ -34,7 +34,6 @@ TARGETS = {
     "show_mb": {"max": 300.0},
     "scrub_fps": {"min": 10.0},
 }
-QUICK_TARGETS = TARGETS
 
 
 def run(_quick: bool) -> dict[str, float]:

@@ -10,11 +10,8 @@ their sources are in ``tests/data/stands_published.json``.
 
 from __future__ import annotations
 
-import argparse
-import json
 import time
-from functools import cache
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,7 +23,7 @@ from tetflora_addon.species.catalog import load_species
 from tetflora_addon.stands.grow import StandSettings, begun
 from tetflora_addon.stands.site import StandSite, StandSpecies, StandTraits
 
-from .report import ROOT, Targets, forget_peak, peak_mb, records_of
+from .report import Targets, apart, forget_peak, peak_mb, published
 
 SPECIES = (
     "beech", "spruce", "scots_pine", "oak", "birch", "ash", "hornbeam", "maple", "larch", "silver_fir", "linden",
@@ -40,7 +37,7 @@ PLANTS = (25_000, 100_000, 1_000_000)
 QUICK_PLANTS = (5_000, 25_000)
 #: Of these: a mixed stand, into which others come from seed.
 _TIMED, _PLANTED, _TIME = ("beech", "oak", "birch", "scots_pine"), 5000.0, 100
-DATA = ROOT / "tests" / "data" / "stands_published.json"
+DATA = "stands_published"
 #: Trees on a hectare whose mean is the height of a stand; diameters that count, cm; hectares of a plot.
 _TOP, _COUNTED, _PLOT = 100, 7.0, 0.1
 
@@ -142,17 +139,8 @@ def timed(plants: int) -> dict[str, float]:
     }
 
 
-def options(parser: argparse.ArgumentParser) -> None:
-    """What may be asked for beside everything."""
-    parser.add_argument("--timed", type=int, metavar="PLANTS", help="only seconds and memory of so many")
-
-
-def run(given: argparse.Namespace) -> dict[str, object] | None:
+def run(quick: bool) -> dict[str, object]:
     """Grow all; rows for each figure: species, years, what, range, value."""
-    if given.timed:
-        print(json.dumps(timed(given.timed)), flush=True)
-        return None
-    quick = given.quick
     names = QUICK_SPECIES if quick else SPECIES
     rows, slopes = [], {}
     for name in names:
@@ -160,7 +148,7 @@ def run(given: argparse.Namespace) -> dict[str, object] | None:
         rows += found
         print(name, *(f"{v:.2f}" for v in slopes[name]), [f for f in found if not f.within], flush=True)
     number = QUICK_PLANTS if quick else PLANTS
-    by_plants = {plants: records_of(["stands", "--timed", str(plants)])[-1] for plants in number}
+    by_plants = {plants: apart(timed, plants) for plants in number}
     biomass = [slope for slope, _ in slopes.values()]
     outside = [row for row in rows if row.counts and not row.within]
     out: dict[str, object] = {
@@ -186,7 +174,7 @@ def run(given: argparse.Namespace) -> dict[str, object] | None:
     return out | {
         "slopes": [
             {"species": name, "biomass": round(a, 3), "reineke": round(b, 3),
-             "published": published()["thinning"]["reineke"].get(name)}
+             "published": published(DATA)["thinning"]["reineke"].get(name)}
             for name, (a, b) in slopes.items()
         ],
         "timed": list(by_plants.values()),
@@ -244,15 +232,9 @@ class Trees(NamedTuple):
         return float(self.height[np.argsort(-self.diameter)[: round(_TOP * self.area)]].mean())
 
 
-@cache
-def published() -> dict[str, Any]:
-    """What is published."""
-    return json.loads(DATA.read_text(encoding="utf-8"))
-
-
 def height(species: str, diameter: NDArray, trees: Trees) -> NDArray:
     """Published height, m, of trees of diameters (n,) in a stand like the one that is given."""
-    data = published()["height"]
+    data = published(DATA)["height"]
     own = data["species"][species]
     log, social = np.log(diameter + 1.0), diameter / trees.mean
     warm, basal = data["temperature"], trees.basal_area - np.pi / 4e4 * diameter**2 / trees.area
@@ -266,13 +248,13 @@ def height(species: str, diameter: NDArray, trees: Trees) -> NDArray:
 
 def crown_width(species: str, diameter: NDArray) -> NDArray:
     """Published width, m, of crowns of trees of diameters (n,)."""
-    a, b, *rest = published()["crown_width"]["species"][species]
+    a, b, *rest = published(DATA)["crown_width"]["species"][species]
     return (a + b * diameter) * (1.0 - np.exp(-((diameter / rest[0]) ** rest[1])) if rest else 1.0)
 
 
 def crown_ratio(species: str, trees: Trees) -> float:
     """Published length of the crown over the height, for the mean tree of a stand."""
-    a, b, c, e = published()["crown_base"]["species"][species]
+    a, b, c, e = published(DATA)["crown_base"]["species"][species]
     mean, tall = trees.mean, float(np.interp(trees.mean, *_by_diameter(trees)))
     return float(np.exp(-abs(a + b * tall / mean + c * mean + e * np.log(trees.top))))
 
@@ -286,7 +268,7 @@ def _by_diameter(trees: Trees) -> tuple[NDArray, NDArray]:
 
 def spread_of_diameters(species: str, trees: Trees) -> float:
     """Published standard deviation of the diameters over 7 cm, over their mean."""
-    a, b, c, e, f = published()["diameters"]["species"][species]
+    a, b, c, e, f = published(DATA)["diameters"]["species"][species]
     largest = np.quantile(trees.diameter, 1.0 - trees.area / (_PLOT * len(trees.diameter)))
     scale, shape = a + b * trees.mean, c + e * trees.mean + f * float(largest)
     least = (_COUNTED - 0.1) / scale
@@ -296,7 +278,7 @@ def spread_of_diameters(species: str, trees: Trees) -> float:
 
 def figures(species: str, years: int, trees: Trees) -> list[Figure]:
     """All figures of a stand that something is published for."""
-    data, found = published(), []
+    data, found = published(DATA), []
 
     def add(figure: str, low: float, high: float, value: float, counts: bool = True) -> None:
         found.append(Figure(species, years, figure, low, high, float(value), counts))
@@ -341,7 +323,7 @@ def curves(species: str, stands: list[Trees]) -> list[Figure]:
 
     Each class of 5 cm counts once, where it has ten trees.
     """
-    data, found = published(), []
+    data, found = published(DATA), []
     diameter = np.concatenate([trees.diameter for trees in stands])
     ratios = {}
     if species in data["height"]["species"]:

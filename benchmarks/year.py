@@ -35,6 +35,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from devtools import session
+from devtools.result_hashes import datablock_hash
 from examples import stage
 from tetflora_addon.blender.job import refine
 from tetflora_addon.blender.results.output import result_collections
@@ -368,34 +369,12 @@ def digest(scene: bpy.types.Scene) -> str:
         for obj in sorted(collection.all_objects, key=lambda o: o.name):
             content.update(np.array(obj.matrix_world, np.float32).tobytes())
             content.update(" ".join(m.name if m else "" for m in getattr(obj.data, "materials", ())).encode())
-            for attribute in sorted(getattr(obj.data, "attributes", ()), key=lambda a: a.name):
-                content.update(attribute.name.encode() + _values(attribute).tobytes())
+            content.update(datablock_hash(obj.data).encode() if hasattr(obj.data, "attributes") else b"")
             if obj.type == 'MESH':
                 offsets = np.zeros(len(obj.data.polygons), np.int32)
                 obj.data.polygons.foreach_get("loop_start", offsets)
                 content.update(offsets.tobytes())
     return content.hexdigest()
-
-
-_FIELDS = {
-    'FLOAT': ("value", 1, np.float32),
-    'INT': ("value", 1, np.int32),
-    'INT8': ("value", 1, np.int32),
-    'BOOLEAN': ("value", 1, np.bool_),
-    'FLOAT2': ("vector", 2, np.float32),
-    'FLOAT_VECTOR': ("vector", 3, np.float32),
-    'FLOAT_COLOR': ("color", 4, np.float32),
-    'INT32_2D': ("value", 2, np.int32),
-    'INT16_2D': ("value", 2, np.int32),
-    'QUATERNION': ("value", 4, np.float32),
-}
-
-
-def _values(attribute: bpy.types.Attribute) -> np.ndarray:
-    field, width, dtype = _FIELDS[attribute.data_type]
-    out = np.zeros(width * len(attribute.data), dtype)
-    attribute.data.foreach_get(field, out)
-    return out
 
 
 def _finish(scene: bpy.types.Scene) -> None:

@@ -13,5 +13,6 @@ def set_format(settings: Any, file_format: str) -> None:
     From Blender 5.0 on, the media type has to allow the format first.
     """
     if hasattr(settings, "media_type"):
-        settings.media_type = 'VIDEO' if file_format == 'FFMPEG' else 'IMAGE'
+        media = {'FFMPEG': 'VIDEO', 'OPEN_EXR_MULTILAYER': 'MULTI_LAYER_IMAGE'}
+        settings.media_type = media.get(file_format, 'IMAGE')
     settings.file_format = file_format

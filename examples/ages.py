@@ -10,7 +10,6 @@ All six have the same seed: it is the same individual throughout.
 
 from __future__ import annotations
 
-import sys
 import tempfile
 from collections.abc import Callable
 from pathlib import Path
@@ -18,12 +17,9 @@ from pathlib import Path
 import bpy
 import numpy as np
 
-from devtools import session
-
 from . import figure, stage
 from .paper.pictures import save_sheet
 
-ROOT = Path(__file__).resolve().parent.parent
 SPECIES, SEED = "oak", 1
 AGES = (8.0, 18.0, 35.0, 80.0, 300.0, 545.0)
 SIZE, SAMPLES = (530, 400), 24
@@ -55,13 +51,5 @@ def render_ages(path: Path, size: tuple[int, int] = SIZE, samples: int = SAMPLES
         save_sheet(render_cells([cell(age) for age in AGES], Path(folder), size, samples), 3, path)
 
 
-def main() -> int:
-    """Render the picture of the documentation, or a smaller one."""
-    given = stage.words(__doc__, ROOT / "docs" / "images" / "ages.jpg", SIZE, SAMPLES).parse_args()
-    session.start()
-    render_ages(given.out, stage.size_of(given, SIZE), given.samples)
-    return 0
-
-
 if __name__ == "__main__":
-    sys.exit(main())
+    stage.make_picture(__doc__, "ages.jpg", SIZE, SAMPLES, render_ages)

@@ -22,7 +22,6 @@ def main() -> int:
     session.clean_file()
     path, number = assets.write_asset_library(options.out.absolute())
     print(f"{path}: {number} plants, {path.stat().st_size / 1000:.0f} kB")
-    session.stop()
     return 0
 
 

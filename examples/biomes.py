@@ -11,13 +11,12 @@ Around the hectare there is more of the same land, with the trees of the biome a
 
 from __future__ import annotations
 
-import argparse
 import json
 import sys
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import bpy
 import numpy as np
@@ -28,9 +27,14 @@ from devtools import session
 
 from . import stage
 from .close_ups import render
-from .paper.pictures import save_sheet
+from .haze import add_haze
+from .paper.pictures import save_jpeg, save_sheet
 from .seasons import LOOKS, Rgb, sky
 from .wood import grid
+
+if TYPE_CHECKING:
+    from tetflora_addon.blender.biomes.adding import BiomeResult
+    from tetflora_addon.blender.biomes.files import Biome
 
 ROOT = Path(__file__).resolve().parent.parent
 SHIPPED = ROOT / "tetflora_addon" / "biomes"
@@ -153,30 +157,30 @@ INTERIOR_SIZE, INTERIOR_SAMPLES = (1600, 900), 48
 
 def build(identifier: str, view: View) -> None:
     """Fill an empty scene with a biome, its land, sun and sky."""
-    from tetflora_addon.blender.biomes import adding, files
+    from tetflora_addon.blender.biomes import adding
     from tetflora_addon.blender.placing.rules import biomes_in
     from tetflora_addon.blender.worker import run_to_end
 
     scene = bpy.context.scene
-    biome = files.read_biome(SHIPPED / f"{identifier}.json")
+    biome = read(identifier)
     land = adding.make_land(scene, biome.ground)
     if view.beside:
-        other = files.read_biome(SHIPPED / f"{view.beside}.json")
-        _add(run_to_end, adding, scene, replace(other, layers=[o for o in other.layers if o["kind"] == "cover"]), land)
-    added = _add(run_to_end, adding, scene, biome, land)
-    around = _around(biome, adding)
+        other = read(view.beside)
+        add(scene, replace(other, layers=[o for o in other.layers if o["kind"] == "cover"]), land)
+    added = add(scene, biome, land)
+    around = _around(biome)
     scene.collection.objects.link(around)
     tall = [layer for layer in biome.layers if layer["kind"] != "cover"]
     if tall:
         seen = {"earth": _from_afar(scene, land), "turf_share": 0.0}
         far = replace(biome, layers=tall, ground={**biome.ground, **seen}, species=biome.species)
-        _add(run_to_end, adding, scene, far, around)
+        add(scene, far, around)
     else:
         around.data.materials.append(land.data.materials[0])
     if view.beside:
         run_to_end(adding.plant_biome_steps(scene, bpy.context.evaluated_depsgraph_get(), biomes_in(scene)[0]))
     if view.water:
-        _brook(scene, adding, biome, view)
+        _brook(scene, biome, view)
     print(identifier, ", ".join(f"{name} {number:,}" for name, number in added.layers), *added.bare, flush=True)
     around.name, scene.tetflora.hidden = "Ground", _HIDDEN
 
@@ -251,21 +255,35 @@ def _clear(scene: bpy.types.Scene, view: View) -> tuple[float, float, float]:
     return float(x), float(y), view.eye[2]
 
 
-def _add(run_to_end, adding, scene, biome, land):
+def read(identifier: str) -> Biome:
+    """A shipped biome."""
+    from tetflora_addon.blender.biomes import files
+
+    return files.read_biome(SHIPPED / f"{identifier}.json")
+
+
+def add(scene: bpy.types.Scene, biome: Biome, land: bpy.types.Object) -> BiomeResult:
+    """Plant a biome on land."""
+    from tetflora_addon.blender.biomes import adding
+    from tetflora_addon.blender.worker import run_to_end
+
     bpy.context.view_layer.update()
     return run_to_end(adding.add_biome_steps(scene, bpy.context.evaluated_depsgraph_get(), biome, [land]))
 
 
-def _around(biome: object, adding: object) -> bpy.types.Object:
+def _around(biome: Biome) -> bpy.types.Object:
     """The same land around the hectare, with the same corners along its border: nothing shows between the two."""
+    from tetflora_addon.blender.biomes import adding
+
     mesh, _, _ = grid("Ground", _LAND, adding.STEP, adding.SIDE, lambda x, y: adding.heights(x, y, biome.ground))
     around = bpy.data.objects.new("Ground", mesh)
     around.tetflora.is_occluder = True
     return around
 
 
-def _brook(scene: bpy.types.Scene, adding: object, biome: object, view: View) -> None:
+def _brook(scene: bpy.types.Scene, biome: Biome, view: View) -> None:
     """Water in the bed of a valley, which falls as the bed does."""
+    from tetflora_addon.blender.biomes import adding
     from tetflora_addon.blender.compat import shader_tree
 
     along = np.linspace(-0.5 * _LAND, 0.5 * _LAND, 300)
@@ -297,8 +315,6 @@ def _mean(land: bpy.types.Object) -> list[float]:
 
 def dress(scene: bpy.types.Scene, view: View, camera: str, season: str) -> float:
     """Look through a camera in a season, whose light it gets; the mean that the exposure aims at."""
-    from .haze import add_haze
-
     look, year, eye = LOOKS[season], scene.tetflora.year, camera == EYE
     scene.camera = scene.objects[camera]
     for old in [o for o in scene.objects if o.type == 'LIGHT' or o.name.startswith("Haze")]:
@@ -310,16 +326,6 @@ def dress(scene: bpy.types.Scene, view: View, camera: str, season: str) -> float
     scene.world = sky(replace(look, clouds=view.clouds, strength=look.strength * light))
     add_haze(scene, *view.haze)
     return look.gray if snowy else view.gray if eye else ABOVE_GRAY
-
-
-def render_biome(
-    identifier: str, path: Path, size: tuple[int, int] = SIZE, samples: int = SAMPLES, view: View | None = None
-) -> None:
-    """Render one biome at eye height in summer, in an empty scene; as it is shown in menus, if no view is given."""
-    session.clean_file()
-    view = view or VIEWS.get(identifier, View())
-    build(identifier, view)
-    render(path, size, samples, gray=dress(bpy.context.scene, view, EYE, "summer"), beyond=0.1)
 
 
 def render_views(identifier: str, folder: Path, size: tuple[int, int] = SIZE, samples: int = SAMPLES) -> list[Path]:
@@ -341,18 +347,16 @@ def _picture(folder: Path, identifier: str, season: str, camera: str) -> Path:
 
 
 def render_interior(path: Path) -> None:
-    """Inside a wood that grew, for the README."""
-    render_biome("birch_pine", path, INTERIOR_SIZE, INTERIOR_SAMPLES, INTERIOR)
+    """Inside a wood that grew, at eye height in summer, for the README; in an empty scene."""
+    build("birch_pine", INTERIOR)
+    gray = dress(bpy.context.scene, INTERIOR, EYE, "summer")
+    render(path, INTERIOR_SIZE, INTERIOR_SAMPLES, gray=gray, beyond=0.1)
 
 
 def save_small(source: Path, identifier: str) -> Path:
     """Store a biome's picture for menus, as well as its bytes allow."""
     target = SHIPPED / f"{identifier}.jpg"
-    picture = Image.open(source).convert("RGB").resize(SMALL, Image.Resampling.LANCZOS)
-    for quality in range(84, 30, -4):
-        picture.save(target, quality=quality, optimize=True)
-        if target.stat().st_size <= LARGEST:
-            break
+    save_jpeg(Image.open(source).convert("RGB").resize(SMALL, Image.Resampling.LANCZOS), target, LARGEST)
     return target
 
 
@@ -371,18 +375,15 @@ def render_sheets(folder: Path, pictures: Path, size: tuple[int, int] = SIZE, sa
 
 def main() -> int:
     """Render the sheet of the documentation, or some pictures."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser = stage.words(__doc__, ROOT / "out" / "biomes", SIZE, SAMPLES)
     parser.add_argument("biomes", nargs="*", help="render these")
     parser.add_argument("--all", action="store_true", help="render all")
-    parser.add_argument("--out", type=Path, default=ROOT / "out" / "biomes")
-    parser.add_argument("--width", type=int, default=SIZE[0])
-    parser.add_argument("--samples", type=int, default=SAMPLES)
     parser.add_argument("--pictures", action="store_true", help="store pictures for menus beside the biomes")
     parser.add_argument("--no-sheet", action="store_true")
     arguments = parser.parse_args()
     session.start()
     arguments.out.mkdir(parents=True, exist_ok=True)
-    size = arguments.width, round(arguments.width * SIZE[1] / SIZE[0])
+    size = stage.size_of(arguments, SIZE)
     wanted = [file.stem for file in sorted(SHIPPED.glob("*.json"))] if arguments.all else arguments.biomes
     for identifier in wanted:
         for old in arguments.out.glob(f"{identifier}-*.png"):
@@ -392,7 +393,6 @@ def main() -> int:
             print(save_small(picture, identifier))
     if not arguments.no_sheet:
         render_sheets(ROOT / "docs" / "images", arguments.out, size, arguments.samples)
-    session.stop()
     return 0
 
 

@@ -23,12 +23,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from devtools import session
-from devtools.formats import set_format
 
 from . import stage
 
 if TYPE_CHECKING:
     from tetflora_addon.compiled.flora import Flora
+    from tetflora_addon.refinement.loop import Statistics
 
 ROOT = Path(__file__).resolve().parent.parent
 SPECIES = ("oak", "scots_pine", "birch", "willow", "ash", "aspen", "beech", "spruce")
@@ -215,12 +215,12 @@ def render(
     gray: float = _GRAY,
     beyond: float = 0.0,
     exposure: float | None = None,
-) -> None:
+) -> Statistics:
     """Refine for the camera and render; ``gray`` is the mean that the exposure aims at, where none is given.
 
     What is beyond the border by a fraction of the picture is as fine as the rest, where plants stand close to the eye.
     """
-    from tetflora_addon.blender.job import refine
+    from .paper.scenes import refined, rendered
 
     scene = bpy.context.scene
     scene.tetflora.refine_at_render = False
@@ -229,17 +229,14 @@ def render(
     scene.render.resolution_percentage = 100
     lens = scene.camera.data.lens
     scene.camera.data.lens = lens / (1.0 + beyond)
-    refine.refine(scene, bpy.context.evaluated_depsgraph_get())
+    statistics = refined(scene)
     scene.camera.data.lens = lens
-    scene.cycles.samples, scene.cycles.use_denoising = samples, True
-    scene.view_settings.exposure = 0.55 if exposure is None else exposure
-    scene.view_settings.look = 'AgX - Medium High Contrast'
-    set_format(scene.render.image_settings, 'PNG')
-    scene.render.filepath = str(path)
-    bpy.ops.render.render(write_still=True)
+    stage.film(scene, 0.55 if exposure is None else exposure)
+    rendered(scene, path, samples)
     if exposure is None:
         scene.view_settings.exposure += metered(path, gray)
         bpy.data.images["Render Result"].save_render(str(path), scene=scene)
+    return statistics
 
 
 def metered(path: Path, gray: float) -> float:
@@ -259,10 +256,7 @@ def render_views(
 ) -> list[Path]:
     """Render a species in all its views; the pictures."""
     session.clean_file()
-    scene = bpy.context.scene
-    scene.render.resolution_x, scene.render.resolution_y = size
-    scene.render.resolution_percentage = 100
-    made = []
+    scene, made = bpy.context.scene, []
     for name, aim in Subject(identifier).views.items():
         if only is None or name in only:
             aim()

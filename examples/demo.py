@@ -109,7 +109,6 @@ def main() -> int:
     arguments = parser.parse_args()
     session.start()
     run(arguments.out.resolve(), arguments.width)
-    session.stop()
     return 0
 
 

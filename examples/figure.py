@@ -65,12 +65,9 @@ def add_figure(scene: bpy.types.Scene, place: stage.Place) -> bpy.types.Object:
 
 def _bands(name: str, stops: tuple[tuple[float, tuple[float, float, float]], ...]) -> bpy.types.Material:
     """Colors by the height in the object, without steps between."""
-    from tetflora_addon.blender.compat import shader_tree
-
     material = bpy.data.materials.new(name)
-    tree = shader_tree(material)
-    tree.nodes.clear()
-    new, link = tree.nodes.new, tree.links.new
+    nodes, links = stage.cleared(material)
+    new, link = nodes.new, links.new
     place, split, ramp = new("ShaderNodeTexCoord"), new("ShaderNodeSeparateXYZ"), new("ShaderNodeValToRGB")
     ramp.color_ramp.interpolation = 'CONSTANT'
     elements = ramp.color_ramp.elements

@@ -11,7 +11,6 @@ stand, at four places of the slider, behind a woman of 1.70 m.
 
 from __future__ import annotations
 
-import sys
 import tempfile
 from pathlib import Path
 
@@ -19,15 +18,14 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
-from devtools import session
-
 from . import stage
 from .close_ups import render
 from .figure import add_figure
+from .haze import add_haze
 from .paper.pictures import save_sheet
 from .seasons import LOOKS, sky
+from .wood import land
 
-ROOT = Path(__file__).resolve().parent.parent
 YEARS = (8, 25, 70, 150)
 SIZE, SAMPLES = (740, 420), 24
 #: Species and their shares of the seeds that arrive.
@@ -59,11 +57,8 @@ def build(scene: bpy.types.Scene, years: int = max(YEARS)) -> bpy.types.Object:
     from tetflora_addon.blender.stands.growing import new_stand_steps
     from tetflora_addon.blender.worker import run_to_end
 
-    from .haze import add_haze
-
-    land, plot = _grid("Ground", _LAND, 4.0), _grid("Plot", _SIDE, 2.0)
-    for ground in (land, plot):
-        scene.collection.objects.link(ground)
+    ground = land(scene, "Ground", _LAND, 4.0, 0.0, _height, {})
+    plot = land(scene, "Plot", _SIDE, 2.0, 0.0, _height, {})
     plot.hide_render = True  # it only says where the stand grows
     stand = scene.tetflora.stand
     stand.years, stand.density, stand.recruits, stand.seed = years, 0.0, 500.0, 3
@@ -73,7 +68,7 @@ def build(scene: bpy.types.Scene, years: int = max(YEARS)) -> bpy.types.Object:
     bpy.context.view_layer.update()
     grown = run_to_end(new_stand_steps(scene, bpy.context.evaluated_depsgraph_get(), [plot]))
     print(f"{grown.plants:,} plants after {grown.years} years, {grown.records:,} records", flush=True)
-    run_to_end(cover_steps(scene, bpy.context.evaluated_depsgraph_get(), scene.tetflora.populate, grounds=[land]))
+    run_to_end(cover_steps(scene, bpy.context.evaluated_depsgraph_get(), scene.tetflora.populate, grounds=[ground]))
     add_figure(scene, (*_FIGURE, float(_height(*np.array(_FIGURE))))).rotation_euler.z = 2.6
     stage.camera(scene, _EYE, _AHEAD, lens=_LENS, far=2000.0)
     scene.tetflora.hidden = _HIDDEN
@@ -88,22 +83,8 @@ def _height(x: NDArray[np.float64], y: NDArray[np.float64]) -> NDArray[np.float6
     return _ROLL * (np.sin(0.045 * x + 0.6) * np.cos(0.038 * y) + 0.3 * np.sin(0.11 * (x - y)))
 
 
-def _grid(name: str, side: float, step: float) -> bpy.types.Object:
-    """A square that rolls a little."""
-    count = round(side / step)
-    at = np.linspace(-side / 2, side / 2, count + 1)
-    x, y = (grid.ravel() for grid in np.meshgrid(at, at))
-    corner = (np.arange(count)[:, None] * (count + 1) + np.arange(count)).ravel()
-    faces = corner[:, None] + [0, 1, count + 2, count + 1]
-    mesh = bpy.data.meshes.new(name)
-    mesh.from_pydata(np.stack([x, y, _height(x, y)], axis=1).tolist(), [], faces.tolist())
-    mesh.shade_smooth()
-    return bpy.data.objects.new(name, mesh)
-
-
 def render_grown(path: Path, size: tuple[int, int] = SIZE, samples: int = SAMPLES) -> None:
-    """The stand in all years, as a sheet."""
-    session.clean_file()
+    """The stand in all years, as a sheet; in an empty scene."""
     field = build(bpy.context.scene)
     with tempfile.TemporaryDirectory() as folder:
         made = []
@@ -116,13 +97,5 @@ def render_grown(path: Path, size: tuple[int, int] = SIZE, samples: int = SAMPLE
         save_sheet(list(zip(made, names, strict=True)), 2, path)
 
 
-def main() -> int:
-    """Render the sheet."""
-    given = stage.words(__doc__, ROOT / "docs" / "images" / "grown.jpg", SIZE, SAMPLES).parse_args()
-    session.start()
-    render_grown(given.out, stage.size_of(given, SIZE), given.samples)
-    return 0
-
-
 if __name__ == "__main__":
-    sys.exit(main())
+    stage.make_picture(__doc__, "grown.jpg", SIZE, SAMPLES, render_grown)

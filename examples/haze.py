@@ -11,30 +11,33 @@ from __future__ import annotations
 import bpy
 import numpy as np
 
-from tetflora_addon.blender import compat
+from . import stage
 
 #: How far the box reaches beyond the land to all sides, and above it, meters.
 _BESIDE, _ABOVE = 300.0, 90.0
 
 
-def add_haze(scene: bpy.types.Scene, extinction: float, airlight: tuple[float, float, float]) -> bpy.types.Object:
+def add_haze(
+    scene: bpy.types.Scene, extinction: float, airlight: tuple[float, float, float], land: str = "Ground"
+) -> bpy.types.Object:
     """Put the scene's ground, and its camera, into a box of haze that throws no shadow.
 
     Parameters
     ----------
     scene : bpy.types.Scene
-        Has an object *Ground*.
     extinction : float
         β, 1/m.
     airlight : tuple of float
         Radiance of air of which nobody sees the end, linear.
+    land : str
+        Name of the ground.
 
     Returns
     -------
     bpy.types.Object
         The box.
     """
-    ground = scene.objects["Ground"]
+    ground = scene.objects[land]
     points = np.zeros(3 * len(ground.data.vertices), np.float32)
     ground.data.vertices.foreach_get("co", points)
     points = np.vstack([points.reshape(-1, 3), scene.camera.location])
@@ -54,22 +57,14 @@ def add_haze(scene: bpy.types.Scene, extinction: float, airlight: tuple[float, f
 def _air(extinction: float, airlight: tuple[float, float, float]) -> bpy.types.Material:
     """A volume that is as bright as the airlight where nobody sees through."""
     material = bpy.data.materials.new("Haze")
-    tree = compat.shader_tree(material)
-    tree.nodes.clear()
-    absorb, glow, both, output = (
-        tree.nodes.new(kind)
-        for kind in (
-            "ShaderNodeVolumeAbsorption",
-            "ShaderNodeEmission",
-            "ShaderNodeAddShader",
-            "ShaderNodeOutputMaterial",
-        )
-    )
+    nodes, links = stage.cleared(material)
+    kinds = "VolumeAbsorption", "Emission", "AddShader", "OutputMaterial"
+    absorb, glow, both, output = (nodes.new(f"ShaderNode{kind}") for kind in kinds)
     absorb.inputs["Color"].default_value = (0.0, 0.0, 0.0, 1.0)
     absorb.inputs["Density"].default_value = extinction
     glow.inputs["Color"].default_value = (*airlight, 1.0)
     glow.inputs["Strength"].default_value = extinction
-    tree.links.new(absorb.outputs[0], both.inputs[0])
-    tree.links.new(glow.outputs[0], both.inputs[1])
-    tree.links.new(both.outputs[0], output.inputs["Volume"])
+    links.new(absorb.outputs[0], both.inputs[0])
+    links.new(glow.outputs[0], both.inputs[1])
+    links.new(both.outputs[0], output.inputs["Volume"])
     return material

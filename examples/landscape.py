@@ -14,12 +14,12 @@ import numpy as np
 from mathutils import Vector
 
 from devtools import session
-from tetflora_addon.blender.job import refine
 from tetflora_addon.blender.placing import plant_objects, terrain
 from tetflora_addon.planting import places, rules
 
 from . import stage
 from .haze import add_haze
+from .paper.scenes import refined, rendered
 from .terrain import Terrain, elevation
 
 PLANTS = 8_636
@@ -86,13 +86,10 @@ def render_landscape(path: Path, width: int = 960, samples: int = 32) -> None:
     bpy.data.objects.remove(scene.objects["Sun"])
     stage.daylight(scene, *_SUN)
     add_haze(scene, *_HAZE)
-    render = scene.render
-    render.resolution_x, render.resolution_y = width, width * 9 // 16
-    render.engine, render.image_settings.file_format, render.filepath = 'CYCLES', 'PNG', str(path)
-    scene.cycles.samples, scene.cycles.use_denoising = samples, True
+    scene.render.resolution_x, scene.render.resolution_y = width, width * 9 // 16
     scene.tetflora.refine_at_render = False
-    refine.refine(scene, bpy.context.evaluated_depsgraph_get())
-    bpy.ops.render.render(write_still=True)
+    refined(scene)
+    rendered(scene, path, samples)
 
 
 def plant(scene: bpy.types.Scene, surface: bpy.types.Object, plants: int) -> bpy.types.Object:

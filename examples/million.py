@@ -24,21 +24,19 @@ from mathutils import Vector
 from numpy.typing import NDArray
 
 from tetflora_addon.blender.attributes import write
-from tetflora_addon.blender.compat import shader_tree
-from tetflora_addon.blender.job import refine
 from tetflora_addon.blender.placing import cover, plant_objects, populations, terrain
 from tetflora_addon.blender.worker import run_to_end
 from tetflora_addon.planting import places, rules
 
 from . import stage
-from .close_ups import metered
+from .close_ups import render
 from .figure import add_figure
 from .haze import add_haze
 from .seasons import Look, sky
 from .terrain import Terrain
 from .wood import grid
 
-PLANTS, WIDTH = 1_000_000, 1600
+PLANTS, WIDTH, MEMORY = 1_000_000, 1600, 6.0
 #: Relative numbers of species in the valleys and on the heights.
 VALLEYS = {"broadleaf_tree": 0.3, "oak": 0.1, "maple": 0.15, "birch": 0.1, "aspen": 0.1, "bush": 0.25}
 HEIGHTS = {"spruce": 0.45, "conifer": 0.3, "birch": 0.1, "bush": 0.15}
@@ -94,12 +92,10 @@ def build(scene: bpy.types.Scene, plants: int = PLANTS, width: int = WIDTH) -> N
     _lake(scene, land, level)
     up = float(land.height(*eye)) + _UP
     target = Vector((*(eye + forward), up - 0.14))
-    camera = stage.camera(scene, (*eye, up), target, (width, width * 9 // 16), view=_VIEW, far=20_000.0)
-    camera.data.clip_start = 0.5
+    stage.camera(scene, (*eye, up), target, (width, width * 9 // 16), view=_VIEW, near=0.5, far=20_000.0)
     stage.sun(scene, _LOOK.sun[0], _LOOK.sun[1] - 180.0, _LOOK.energy, _LOOK.tint, 0.8)
     scene.world = sky(_LOOK)
     add_haze(scene, *_LOOK.haze)
-    stage.film(scene)
 
 
 def _open_summit(scene: bpy.types.Scene, land: Terrain, eye: NDArray[np.float64], forward: NDArray[np.float64]) -> None:
@@ -147,12 +143,11 @@ def _lake(scene: bpy.types.Scene, land: Terrain, level: float) -> None:
 def _water() -> bpy.types.Material:
     """Dark, and as smooth as wind on a calm morning leaves it."""
     material = bpy.data.materials.new("Water")
-    tree = shader_tree(material)
-    tree.nodes.clear()
-    surface, output = tree.nodes.new("ShaderNodeBsdfPrincipled"), tree.nodes.new("ShaderNodeOutputMaterial")
+    nodes, links = stage.cleared(material)
+    surface, output = nodes.new("ShaderNodeBsdfPrincipled"), nodes.new("ShaderNodeOutputMaterial")
     surface.inputs["Base Color"].default_value = (0.012, 0.02, 0.02, 1.0)
     surface.inputs["Roughness"].default_value, surface.inputs["IOR"].default_value = 0.12, 1.33
-    tree.links.new(surface.outputs[0], output.inputs["Surface"])
+    links.new(surface.outputs[0], output.inputs["Surface"])
     return material
 
 
@@ -194,7 +189,7 @@ def _plant(scene: bpy.types.Scene, surface: bpy.types.Object, land: Terrain, pla
 
 
 def render_million(
-    path: Path, plants: int = PLANTS, width: int = WIDTH, samples: int = 24, memory: float = 8.0
+    path: Path, plants: int = PLANTS, width: int = WIDTH, samples: int = 24, memory: float = MEMORY
 ) -> dict[str, float]:
     """Refine and render it in a file of its own, in Cycles, within so many gigabytes.
 
@@ -206,24 +201,17 @@ def render_million(
     session.clean_file()
     scene = bpy.context.scene
     build(scene, plants, width)
-    render = scene.render
-    render.engine, render.image_settings.file_format, render.filepath = 'CYCLES', 'PNG', str(path)
-    scene.cycles.samples, scene.cycles.use_denoising = samples, True
-    scene.tetflora.refine_at_render = False
     scene.tetflora.max_memory = memory
     begin = time.perf_counter()
-    statistics = refine.refine(scene, bpy.context.evaluated_depsgraph_get())
-    refined = time.perf_counter()
-    bpy.ops.render.render(write_still=True)
-    scene.view_settings.exposure += metered(path, _LOOK.gray)
-    bpy.data.images["Render Result"].save_render(str(path), scene=scene)
+    statistics = render(path, (width, width * 9 // 16), samples, gray=_LOOK.gray)
+    refine_s = sum(statistics.seconds.values())
     return {
         "plants": statistics.plants,
         "polygons_full": statistics.polygons_full,
         "polygons": statistics.polygons_meshed,
         "facets": statistics.polygons_proxy,
-        "refine_s": refined - begin,
-        "render_s": time.perf_counter() - refined,
+        "refine_s": refine_s,
+        "render_s": time.perf_counter() - begin - refine_s,
     }
 
 
@@ -233,7 +221,7 @@ def main() -> int:
     parser.add_argument("--plants", type=int, default=PLANTS)
     parser.add_argument("--width", type=int, default=WIDTH)
     parser.add_argument("--samples", type=int, default=24)
-    parser.add_argument("--memory", type=float, default=8.0, help="gigabytes for plants and renderer")
+    parser.add_argument("--memory", type=float, default=MEMORY, help="gigabytes for plants and renderer")
     parser.add_argument("--output", type=Path, default=Path("out") / "million.png")
     arguments = parser.parse_args()
     arguments.output.parent.mkdir(parents=True, exist_ok=True)
@@ -241,7 +229,6 @@ def main() -> int:
         arguments.output.resolve(), arguments.plants, arguments.width, arguments.samples, arguments.memory
     )
     print(", ".join(f"{name} {value:,.1f}" for name, value in made.items()))
-    session.stop()
     return 0
 
 

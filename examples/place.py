@@ -149,6 +149,4 @@ def main() -> int:
 
 
 if __name__ == "__main__":
-    code = main()
-    session.stop()
-    sys.exit(code)
+    sys.exit(main())

@@ -98,7 +98,7 @@ def render(distance: str, folder: Path, samples: int = SAMPLES, seed: int = 0, e
     if expand:
         with TemporaryDirectory() as spare:
             cover = images.coverage(scene, Path(spare) / "cover.png", 256)
-        _write_mask(folder / f"{distance}-mask.png", cover)
+        images.save_picture(folder / f"{distance}-mask.png", cover)
 
 
 def stored(path: Path) -> NDArray[np.float32]:
@@ -122,18 +122,6 @@ def compare(image: Path, reference: Path, mask: Path) -> dict[str, float]:
     error = images.flip_map(a, b)
     found = {"flip": error[seen].mean(), "flip_all": error.mean(), "color": images.color_error(a, b, seen)}
     return {key: round(float(value), 5) for key, value in found.items()}
-
-
-def _write_mask(path: Path, cover: NDArray[np.float32]) -> None:
-    height, width = cover.shape
-    image = bpy.data.images.new("mask", width, height)
-    image.colorspace_settings.name = "Non-Color"
-    gray = np.repeat(cover[::-1, :, None], 4, axis=2).clip(0.0, 1.0)
-    gray[..., 3] = 1.0
-    image.pixels.foreach_set(gray.ravel())
-    image.filepath_raw, image.file_format = str(path), 'PNG'
-    image.save()
-    bpy.data.images.remove(image)
 
 
 def main() -> None:

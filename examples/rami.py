@@ -23,9 +23,11 @@ import numpy as np
 from mathutils import Matrix, Vector
 from numpy.typing import NDArray
 
+from benchmarks import pictures
 from devtools.formats import set_format
 from tetflora_addon.blender.compat import shader_tree
 
+from . import stage
 from .rami_discs import CORNERS, Canopy, Solid, canopy, discs, polygons, published
 
 #: Crowns of a kind that differ; the others are turned copies.
@@ -50,10 +52,8 @@ def build(scene: bpy.types.Scene, stand: Canopy, rings: int | None = None, plant
     if stand.ground:
         # Open borders end with the ground; a periodic scene goes on.
         reach = _GROUND if stand.padding else stand.side / 2
-        _add_mesh(scene, "Ground", _square(reach), [lambertian("Ground", stand.ground)])
-    camera = bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))
-    scene.collection.objects.link(camera)
-    scene.camera = camera
+        stage.ground(2.0 * reach, (stand.ground,) * 3)
+    stage.camera(scene, (0.0, 0.0, 0.0), (1.0, 0.0, 0.0), near=1.0, far=2 * _FAR, across=stand.side)
     if plants:
         place(
             scene,
@@ -115,20 +115,6 @@ def _tube(height: float, radius: float, sides: int = 16) -> NDArray[np.float32]:
     ring = radius * np.column_stack([np.cos(turn), np.sin(turn), 0 * turn])
     top = ring + (0.0, 0.0, height)
     return np.stack([ring[:-1], ring[1:], top[1:], top[:-1]], axis=1).reshape(-1, 3).astype(np.float32)
-
-
-def _square(reach: float) -> NDArray[np.float32]:
-    return np.array([(-1, -1, 0), (1, -1, 0), (1, 1, 0), (-1, 1, 0)], np.float32) * np.float32(reach)
-
-
-def _add_mesh(scene: bpy.types.Scene, name: str, corners: NDArray, materials: list) -> bpy.types.Object:
-    mesh = bpy.data.meshes.new(name)
-    _fill(mesh, corners, np.full(len(corners) // 4, 4))
-    for material in materials:
-        mesh.materials.append(material)
-    made = bpy.data.objects.new(name, mesh)
-    scene.collection.objects.link(made)
-    return made
 
 
 def _fill(mesh: bpy.types.Mesh, corners: NDArray[np.float32], faces: NDArray[np.int64]) -> None:
@@ -202,9 +188,7 @@ def set_view(scene: bpy.types.Scene, stand: Canopy, zenith: float, pixels: int) 
     # The image's horizontal is y, so that its vertical lies in the principal plane.
     across = Vector((0.0, 1.0, 0.0))
     camera.rotation_euler = Matrix((across, toward.cross(across), toward)).transposed().to_euler()
-    camera.data.type, camera.data.sensor_fit = 'ORTHO', 'HORIZONTAL'
-    camera.data.ortho_scale = stand.side
-    camera.data.clip_start, camera.data.clip_end = 1.0, 2 * _FAR
+    camera.data.sensor_fit = 'HORIZONTAL'
     height = pixels * cos(angle)
     # Blender renders no fewer than four rows.
     rows = max(round(height), 4)
@@ -214,19 +198,11 @@ def set_view(scene: bpy.types.Scene, stand: Canopy, zenith: float, pixels: int) 
 
 def radiance(scene: bpy.types.Scene, path: Path, samples: int, seed: int = 0) -> NDArray[np.float32]:
     """Render what the scene holds into a file of floats and read it: RGBA (height, width, 4)."""
-    scene.cycles.samples, scene.cycles.seed = samples, seed
-    set_format(scene.render.image_settings, 'OPEN_EXR')
-    scene.render.image_settings.color_depth = '32'
-    scene.render.image_settings.color_mode = 'RGBA'
-    scene.render.filepath = str(path)
-    bpy.ops.render.render(write_still=True)
-    image = bpy.data.images.load(str(path), check_existing=False)
-    image.colorspace_settings.name = "Non-Color"
-    pixels = np.zeros(image.size[0] * image.size[1] * 4, np.float32)
-    image.pixels.foreach_get(pixels)
-    shape = image.size[1], image.size[0], 4
-    bpy.data.images.remove(image)
-    return pixels.reshape(shape)
+    settings = scene.render.image_settings
+    set_format(settings, 'OPEN_EXR')
+    settings.color_depth, settings.color_mode = '32', 'RGBA'
+    pictures.render(scene, path, samples, seed, form='OPEN_EXR')
+    return pictures.read_picture(path)
 
 
 def reflectance_factor(pixels: NDArray[np.floating], stand: Canopy, strength: float = pi) -> float:
@@ -255,7 +231,6 @@ def main() -> int:
         angles, factors = published(arguments.name)
         reference = float(np.interp(zenith, angles, factors))
         print(f"{zenith:6.1f}  {found:.4f}  published {reference:.4f}  {found / reference - 1:+.4f}", flush=True)
-    session.stop()
     return 0
 
 

@@ -10,8 +10,6 @@ Both are of the same model at the same places; the second is refined although Cy
 
 from __future__ import annotations
 
-import argparse
-import sys
 import tempfile
 from pathlib import Path
 
@@ -20,55 +18,49 @@ from PIL import Image
 
 from devtools import session
 
-ROOT = Path(__file__).resolve().parent.parent
+from . import stage
+from .paper.pictures import save_jpeg
+
+SIZE, SAMPLES, INSTANCES = (800, 360), 20, 10_000
 #: Rows of white between the two pictures.
 _GAP = 6
 
 
-def render(scene: bpy.types.Scene, path: Path) -> Image.Image:
-    """One picture of the scene as it is."""
-    scene.render.filepath = str(path)
-    bpy.ops.render.render(write_still=True)
-    return Image.open(path).convert("RGB")
-
-
-def pair(instances: int, width: int, samples: int) -> Image.Image:
-    """Both pictures, one above the other."""
+def render_pair(path: Path, size: tuple[int, int] = SIZE, samples: int = SAMPLES, instances: int = INSTANCES) -> None:
+    """Both pictures, one above the other, as a JPEG; in an empty scene."""
     from benchmarks import assets
-    from tetflora_addon.blender.job.refine import refine
 
-    scene, size = bpy.context.scene, (width, width * 9 // 20)
+    from .paper.scenes import refined, rendered
+
+    scene = bpy.context.scene
     instancer = assets.build(scene, assets.Scatter("leaves", instances, "near", size=size))
-    scene.render.engine = 'CYCLES'
-    scene.cycles.samples, scene.cycles.use_denoising = samples, True
+    both = Image.new("RGB", (size[0], 2 * size[1] + _GAP), "white")
     with tempfile.TemporaryDirectory() as folder:
-        plain = render(scene, Path(folder) / "plain.png")
+        picture = Path(folder) / "picture.png"
+        rendered(scene, picture, samples)
+        both.paste(Image.open(picture), (0, 0))
         instancer.tetflora.is_scatter = True
         scene.tetflora.asset_detail = 'REFINE'
-        statistics = refine(scene, bpy.context.evaluated_depsgraph_get())
+        statistics = refined(scene)
         print(
             f"{statistics.polygons_full:,} polygons: {statistics.instances_whole} originals, "
             f"{statistics.instances_clusters} clusters, {statistics.polygons_proxy:,} facets"
         )
-        refined = render(scene, Path(folder) / "refined.png")
-    both = Image.new("RGB", (size[0], 2 * size[1] + _GAP), "white")
-    both.paste(plain, (0, 0))
-    both.paste(refined, (0, size[1] + _GAP))
-    return both
+        rendered(scene, picture, samples)
+        both.paste(Image.open(picture), (0, size[1] + _GAP))
+    save_jpeg(both, path)
 
 
-def main(arguments: list[str] | None = None) -> None:
+def main() -> None:
     """Command line."""
-    parser = argparse.ArgumentParser(description=__doc__.split("\n\n")[0])
-    parser.add_argument("--instances", type=int, default=10_000)
-    parser.add_argument("--width", type=int, default=800)
-    parser.add_argument("--samples", type=int, default=20)
-    parser.add_argument("--out", type=Path, default=ROOT / "docs" / "images" / "assets.jpg")
-    given = parser.parse_args(arguments)
+    parser = stage.words(__doc__, session.ROOT / "docs" / "images" / "assets.jpg", SIZE, SAMPLES)
+    parser.add_argument("--instances", type=int, default=INSTANCES)
+    given = parser.parse_args()
     session.start()
+    session.clean_file()
     given.out.parent.mkdir(parents=True, exist_ok=True)
-    pair(given.instances, given.width, given.samples).save(given.out, quality=88)
+    render_pair(given.out, stage.size_of(given, SIZE), given.samples, given.instances)
 
 
 if __name__ == "__main__":
-    main(sys.argv[1:])
+    main()

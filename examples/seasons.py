@@ -24,8 +24,9 @@ from devtools import session
 
 from . import stage
 from .close_ups import render
+from .haze import add_haze
 from .paper.pictures import save_sheet
-from .wood import grid
+from .wood import add_wood, cover_all, land, seen_less
 
 ROOT = Path(__file__).resolve().parent.parent
 SIZE, SAMPLES = (750, 422), 96
@@ -134,10 +135,12 @@ def build(scene: bpy.types.Scene) -> None:
     _add_cherry(scene)
     for species, seed, (x, y), scale, age in _LONE:
         stage.plant(scene, species, seed, (x, y, float(height(np.float64(x), np.float64(y)))), 2.4 * seed, scale, age)
+    masks = {_WOOD: lambda x, y: np.clip(wooded(x, y) / 4.0, 0.0, 1.0)}
+    masks[_MARGIN] = lambda x, y: np.clip(1.0 - np.abs(wooded(x, y) - 1.0) / 4.5, 0.0, 1.0)
     for name, side, step, hole in (("Near", _NEAR, 2.0, 0.0), ("Far", _LAND, 5.0, _NEAR)):
-        ground = _ground(name, side, step, hole)
-        scene.collection.objects.link(ground)
-        _plant(scene, ground)
+        ground = land(scene, name, side, step, hole, height, masks, nearest=-60.0)
+        add_wood(scene, ground, _WOOD, _HILL, 3.2, 480.0, (0.6, 1.15), _HABIT)
+        cover_all(scene, add_wood(scene, ground, _MARGIN, _EDGE, 1.5, 700.0, (0.45, 0.95), 0.0))
     eye, ahead = (Vector((x, y, z + float(height(np.float64(x), np.float64(y))))) for x, y, z in (EYE, AHEAD))
     stage.camera(scene, eye, ahead, lens=LENS, near=0.05)
     scene.tetflora.refine_at_render = False
@@ -151,7 +154,7 @@ def dress(scene: bpy.types.Scene, look: Look) -> None:
         bpy.data.objects.remove(old)
     stage.sun(scene, look.sun[0], look.sun[1] - 180.0, look.energy, look.tint, 0.8)
     scene.world = sky(look)
-    _air(scene, look)
+    add_haze(scene, *look.haze, land="Far")
 
 
 def _add_cherry(scene: bpy.types.Scene) -> None:
@@ -164,59 +167,11 @@ def _add_cherry(scene: bpy.types.Scene) -> None:
     store_species(scene, "cherry", {**page, "name": "Cherry", "orders": orders, "year": year})
 
 
-def _ground(name: str, side: float, step: float, hole: float) -> bpy.types.Object:
-    """Land on which attributes say where the wood and its edge are."""
-    from tetflora_addon.blender.attributes import write
-
-    mesh, x, y = grid(name, side, step, hole, height, nearest=-60.0)
-    inside = wooded(x, y)
-    write(mesh, _WOOD, np.clip(inside / 4.0, 0.0, 1.0).astype(np.float32))
-    write(mesh, _MARGIN, np.clip(1.0 - np.abs(inside - 1.0) / 4.5, 0.0, 1.0).astype(np.float32))
-    return bpy.data.objects.new(name, mesh)
-
-
-def _plant(scene: bpy.types.Scene, ground: bpy.types.Object) -> None:
-    """Plant the hill and its edge on a ground, and cover all of it."""
-    from tetflora_addon.blender.placing import cover, populations
-    from tetflora_addon.blender.species.edits import in_wood
-    from tetflora_addon.blender.worker import run_to_end
-
-    for mask, mix, apart, density, sizes, habit in (
-        (_WOOD, _HILL, 3.2, 480.0, (0.6, 1.15), _HABIT),
-        (_MARGIN, _EDGE, 1.5, 700.0, (0.45, 0.95), 0.0),
-    ):
-        some = populations.add_population(scene, [ground], name=f"{ground.name} {mask}")
-        for species, weight in mix.items():
-            entry = some.mix.add()
-            entry.species, entry.weight = in_wood(scene, species, habit), weight
-        some.vertex_group, some.min_distance = mask, apart
-        some.by_density, some.density = True, density
-        some.scale_min, some.scale_max, some.seed = *sizes, 3
-        run_to_end(populations.make_plants_steps(scene, bpy.context.evaluated_depsgraph_get(), some))
-        bpy.context.view_layer.update()
-    steps = cover.cover_steps(scene, bpy.context.evaluated_depsgraph_get(), some, masks={"vertex_group": ""})
-    run_to_end(steps)
-
-
-def _air(scene: bpy.types.Scene, look: Look) -> None:
-    """Haze over the land."""
-    from .haze import add_haze
-
-    ground = scene.objects["Far"]
-    ground.name = "Ground"
-    try:
-        add_haze(scene, *look.haze)
-    finally:
-        ground.name = "Far"
-
-
 def sky(look: Look) -> bpy.types.World:
     """Three colors from the horizon to the zenith, with clouds; seen less bright than its light, as on film."""
-    from tetflora_addon.blender.compat import shader_tree
-
     world = bpy.data.worlds.new("Sky")
-    tree = shader_tree(world)
-    tree.nodes.clear()
+    stage.cleared(world)
+    tree = world.node_tree
     new, link = tree.nodes.new, tree.links.new
     place, split, ramp = new("ShaderNodeTexCoord"), new("ShaderNodeSeparateXYZ"), new("ShaderNodeValToRGB")
     stops = ramp.color_ramp.elements
@@ -226,10 +181,7 @@ def sky(look: Look) -> bpy.types.World:
     link(place.outputs["Generated"], split.inputs[0])
     link(split.outputs["Z"], ramp.inputs[0])
     background, output = new("ShaderNodeBackground"), new("ShaderNodeOutputWorld")
-    path, seen = new("ShaderNodeLightPath"), new("ShaderNodeMapRange")
-    seen.inputs["To Min"].default_value, seen.inputs["To Max"].default_value = look.strength, 0.85 * look.strength
-    link(path.outputs["Is Camera Ray"], seen.inputs["Value"])
-    link(seen.outputs[0], background.inputs["Strength"])
+    seen_less(tree, background, look.strength, 0.85)
     link(_clouds(tree, place, split, ramp.outputs["Color"], look.clouds), background.inputs["Color"])
     link(background.outputs[0], output.inputs["Surface"])
     return world

@@ -5,12 +5,14 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from math import radians
 from pathlib import Path
 
 import bpy
 from mathutils import Vector
+
+from devtools import session
 
 Place = Sequence[float]
 SUNLIGHT = (1.0, 0.94, 0.85)
@@ -40,15 +42,26 @@ def ground(side: float, color: tuple[float, float, float] = (0.16, 0.14, 0.10)) 
     bpy.ops.mesh.primitive_plane_add(size=side)
     made = bpy.context.object
     made.name = "Ground"
-    material = bpy.data.materials.new("Ground")
-    material.diffuse_color = (*color, 1.0)
-    tree = _tree(material)
-    tree.nodes.clear()
-    surface, output = tree.nodes.new("ShaderNodeBsdfDiffuse"), tree.nodes.new("ShaderNodeOutputMaterial")
-    surface.inputs["Color"].default_value = (*color, 1.0)
-    tree.links.new(surface.outputs[0], output.inputs["Surface"])
-    made.data.materials.append(material)
+    made.data.materials.append(dull("Ground", color))
     return made
+
+
+def dull(name: str, color: tuple[float, float, float]) -> bpy.types.Material:
+    """A new material that scatters light alike to all sides."""
+    made = bpy.data.materials.new(name)
+    made.diffuse_color = (*color, 1.0)
+    nodes, links = cleared(made)
+    surface, output = nodes.new("ShaderNodeBsdfDiffuse"), nodes.new("ShaderNodeOutputMaterial")
+    surface.inputs["Color"].default_value = (*color, 1.0)
+    links.new(surface.outputs[0], output.inputs["Surface"])
+    return made
+
+
+def cleared(owner: bpy.types.Material | bpy.types.World) -> tuple[bpy.types.Nodes, bpy.types.NodeLinks]:
+    """Nodes of a material or world, of which none is left, and their links."""
+    tree = _tree(owner)
+    tree.nodes.clear()
+    return tree.nodes, tree.links
 
 
 def _tree(owner: bpy.types.Material | bpy.types.World) -> bpy.types.NodeTree:
@@ -66,15 +79,19 @@ def camera(
     view: float | None = None,
     near: float = 0.1,
     far: float = 3000.0,
+    across: float | None = None,
 ) -> bpy.types.Object:
     """The scene's camera, which looks from one place (3,) to another.
 
-    size: of the image, pixels; view: across the image, radians, instead of a lens; near, far: of what it sees, meters.
+    size: of the image, pixels; view: across the image, radians, instead of a lens; near, far: of what it sees, meters;
+    across: meters along the longer side of the image of a view without perspective.
     """
     made = bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))
     made.data.lens, made.data.clip_start, made.data.clip_end = lens, near, far
     if view is not None:
         made.data.sensor_fit, made.data.angle = 'HORIZONTAL', view
+    if across is not None:
+        made.data.type, made.data.ortho_scale = 'ORTHO', across
     scene.collection.objects.link(made)
     scene.camera = made
     look(scene, eye, ahead)
@@ -108,20 +125,41 @@ def sun(
 def daylight(scene: bpy.types.Scene, elevation: float, azimuth: float) -> None:
     """Sun as of `sun`, and a sky that is blue above and pale at the horizon."""
     sun(scene, elevation, azimuth)
-    scene.world = bpy.data.worlds.new("Sky")
-    tree = _tree(scene.world)
-    nodes, links = tree.nodes, tree.links
-    place = nodes.new("ShaderNodeTexCoord")
-    split = nodes.new("ShaderNodeSeparateXYZ")
-    ramp = nodes.new("ShaderNodeValToRGB")
+    background = even_sky(scene, strength=0.55)
+    nodes, links = scene.world.node_tree.nodes, scene.world.node_tree.links
+    place, split, ramp = (nodes.new(f"ShaderNode{kind}") for kind in ("TexCoord", "SeparateXYZ", "ValToRGB"))
     stops = ramp.color_ramp.elements
     stops[0].position, stops[0].color = 0.0, (0.62, 0.76, 0.92, 1)
     stops[1].position, stops[1].color = 0.5, (0.08, 0.24, 0.70, 1)
     links.new(place.outputs["Generated"], split.inputs[0])
     links.new(split.outputs["Z"], ramp.inputs[0])
-    background = next(n for n in nodes if n.type == 'BACKGROUND')
-    background.inputs["Strength"].default_value = 0.55
     links.new(ramp.outputs["Color"], background.inputs["Color"])
+
+
+def even_sky(
+    scene: bpy.types.Scene, color: tuple[float, float, float] = (1.0, 1.0, 1.0), strength: float = 1.0
+) -> bpy.types.ShaderNode:
+    """A sky of one color in place of what the scene has; the node that it is."""
+    scene.world = bpy.data.worlds.new("Sky")
+    background = next(node for node in _tree(scene.world).nodes if node.type == 'BACKGROUND')
+    background.inputs["Color"].default_value, background.inputs["Strength"].default_value = (*color, 1.0), strength
+    return background
+
+
+def instancing(
+    name: str, members: bpy.types.Collection
+) -> tuple[bpy.types.NodeTree, bpy.types.Node, bpy.types.Node, bpy.types.Node]:
+    """Nodes that put members of a collection on points: the tree, what goes in, what places them, what comes out."""
+    tree = bpy.data.node_groups.new(name, 'GeometryNodeTree')
+    for way in ('INPUT', 'OUTPUT'):
+        tree.interface.new_socket("Geometry", in_out=way, socket_type='NodeSocketGeometry')
+    kinds = "NodeGroupInput", "GeometryNodeInstanceOnPoints", "NodeGroupOutput", "GeometryNodeCollectionInfo"
+    given, placed, made, source = (tree.nodes.new(kind) for kind in kinds)
+    source.inputs["Collection"].default_value = members
+    source.inputs["Separate Children"].default_value = source.inputs["Reset Children"].default_value = True
+    placed.inputs["Pick Instance"].default_value = True
+    tree.links.new(source.outputs[0], placed.inputs["Instance"])
+    return tree, given, placed, made
 
 
 def film(scene: bpy.types.Scene, exposure: float = 0.8) -> None:
@@ -141,3 +179,13 @@ def words(doc: str, out: Path | None, size: tuple[int, int], samples: int) -> ar
 def size_of(given: argparse.Namespace, size: tuple[int, int]) -> tuple[int, int]:
     """Pixels of a picture that is as wide as was asked for, in the proportions of a size."""
     return given.width, round(given.width * size[1] / size[0])
+
+
+def make_picture(
+    doc: str, name: str, size: tuple[int, int], samples: int, render: Callable[[Path, tuple[int, int], int], None]
+) -> None:
+    """A command whose function renders one picture of the documentation in an empty scene, or where its words say."""
+    given = words(doc, session.ROOT / "docs" / "images" / name, size, samples).parse_args()
+    session.start()
+    session.clean_file()
+    render(given.out, size_of(given, size), given.samples)

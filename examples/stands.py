@@ -11,12 +11,10 @@ from dataclasses import dataclass
 from math import radians, tan
 
 import bpy
-import numpy as np
 
-from tetflora_addon.blender import compat
+from tetflora_addon.blender.job.plant_mesh import single_seed
 from tetflora_addon.compiled.flora import compile_species
-from tetflora_addon.emission import plants
-from tetflora_addon.growth import seeds
+from tetflora_addon.emission.plants import expanded_blocks
 from tetflora_addon.species import catalog
 
 from . import stage
@@ -64,7 +62,7 @@ def build(scene: bpy.types.Scene, pixels: int, light: str, each: int, species: t
     slot = 0.85 * HEIGHT
     width = slot * each * len(species)
     for s, identifier in enumerate(species):
-        scale = HEIGHT / _height(identifier)
+        scale = HEIGHT / height_of(identifier)
         for i in range(each):
             place = (s * each + i + 0.5) * slot - width / 2, 0.0, 0.0
             stage.plant(scene, identifier, 100 * s + i, place, 2.399963 * i, scale)
@@ -75,13 +73,10 @@ def build(scene: bpy.types.Scene, pixels: int, light: str, each: int, species: t
     return Stand(scene, {name: slice(s * columns, (s + 1) * columns) for s, name in enumerate(species)})
 
 
-def _height(identifier: str) -> float:
-    """Height of a plant of a species, meters."""
+def height_of(identifier: str, seed: int = 0) -> float:
+    """Height of one plant of a species, meters."""
     flora = compile_species([catalog.load_species(identifier)])
-    one = seeds.Seeds(
-        (identifier,), np.zeros(1, np.int32), np.zeros(1, np.int64), np.zeros((1, 3)), np.eye(3)[None], np.ones(1)
-    )
-    return float(max(block.buffers.positions[:, 2].max() for block in plants.expanded_blocks(flora, one)))
+    return max(float(b.buffers.positions[:, 2].max()) for b in expanded_blocks(flora, single_seed(identifier, seed)))
 
 
 def set_light(scene: bpy.types.Scene, light: str) -> None:
@@ -91,15 +86,9 @@ def set_light(scene: bpy.types.Scene, light: str) -> None:
         bpy.data.lights.remove(old.data)
     if scene.world is not None:
         bpy.data.worlds.remove(scene.world)
-    world = bpy.data.worlds.new("Sky")
-    scene.world = world
-    tree = compat.shader_tree(world)
-    background = next(n for n in tree.nodes if n.type == 'BACKGROUND')
-    background.inputs["Color"].default_value = (0.75, 0.85, 1.0, 1.0)
-    background.inputs["Strength"].default_value = 1.0 if azimuth is None else 0.35
-    if azimuth is None:
-        return
-    stage.sun(scene, _ELEVATION, -azimuth, 3.5, (1.0, 0.95, 0.88))
+    stage.even_sky(scene, (0.75, 0.85, 1.0), 1.0 if azimuth is None else 0.35)
+    if azimuth is not None:
+        stage.sun(scene, _ELEVATION, -azimuth, 3.5, (1.0, 0.95, 0.88))
 
 
 def _add_camera(scene: bpy.types.Scene, pixels: int, width: float) -> None:

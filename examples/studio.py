@@ -13,14 +13,13 @@ import numpy as np
 from mathutils import Vector
 
 from devtools import session
-from devtools.formats import set_format
-from tetflora_addon.blender import compat
 
 from . import stage
+from .paper.scenes import rendered
 
 #: Degrees by which the camera looks down, and by which plants stand to its side of the sun.
 _PITCH, _SUN = 9.0, -40.0
-_FLOOR = (0.55, 0.57, 0.58, 1.0)
+_FLOOR = (0.55, 0.57, 0.58)
 
 
 def add_studio(points: np.ndarray, aspect: float) -> None:
@@ -47,31 +46,15 @@ def add_studio(points: np.ndarray, aspect: float) -> None:
     side = 400 * height
     corners = [(-side, -side, 0), (side, -side, 0), (side, side, 0), (-side, side, 0)]
     floor.from_pydata([(x, y, z + low[2]) for x, y, z in corners], [], [(0, 1, 2, 3)])
-    material = bpy.data.materials.new("Floor")
-    material.diffuse_color = _FLOOR
-    tree = compat.shader_tree(material)
-    tree.nodes.clear()
-    diffuse, output = tree.nodes.new("ShaderNodeBsdfDiffuse"), tree.nodes.new("ShaderNodeOutputMaterial")
-    diffuse.inputs["Color"].default_value = _FLOOR
-    tree.links.new(diffuse.outputs[0], output.inputs[0])
-    floor.materials.append(material)
+    floor.materials.append(stage.dull("Floor", _FLOOR))
     scene.collection.objects.link(bpy.data.objects.new("Floor", floor))
-    camera = bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))
-    camera.data.type, camera.data.ortho_scale = 'ORTHO', height * max(aspect, 1.0)
     up = Vector((0.0, math.sin(pitch), math.cos(pitch)))
     forward = Vector((0.0, math.cos(pitch), -math.sin(pitch)))
-    distance = 20.0 * height
-    camera.location = middle * up - distance * forward
-    camera.rotation_euler = (math.pi / 2 - pitch, 0.0, 0.0)
-    camera.data.clip_end = 1000.0 * height
-    scene.collection.objects.link(camera)
-    scene.camera = camera
-    stage.daylight(scene, elevation=48.0, azimuth=180.0 - _SUN)
+    eye = middle * up - 20.0 * height * forward
+    stage.camera(scene, eye, eye + forward, far=1000.0 * height, across=height * max(aspect, 1.0))
+    stage.sun(scene, 48.0, 180.0 - _SUN)
     # The light of a clouded sky around the sun: colored shadows would color the plants.
-    background = next(n for n in scene.world.node_tree.nodes if n.type == 'BACKGROUND')
-    for link in list(background.inputs["Color"].links):
-        scene.world.node_tree.links.remove(link)
-    background.inputs["Color"].default_value, background.inputs["Strength"].default_value = (0.9, 0.95, 1.0, 1.0), 0.7
+    stage.even_sky(scene, (0.9, 0.95, 1.0), 0.7)
 
 
 def render_cells(
@@ -96,11 +79,7 @@ def render_cells(
         add_studio(points, size[0] / size[1])
         stage.film(scene)
         scene.tetflora.refine_at_render = False
-        scene.render.engine = 'CYCLES'
-        scene.cycles.samples, scene.cycles.use_denoising = samples, True
         scene.render.resolution_x, scene.render.resolution_y = size
-        set_format(scene.render.image_settings, 'PNG')
         made.append((folder / f"{number}.png", title))
-        scene.render.filepath = str(made[-1][0])
-        bpy.ops.render.render(write_still=True)
+        rendered(scene, made[-1][0], samples)
     return made

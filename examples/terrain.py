@@ -9,6 +9,8 @@ import numpy as np
 from matplotlib import cbook
 from numpy.typing import NDArray
 
+from . import stage
+
 METERS_PER_DEGREE = 111_320.0
 
 
@@ -85,10 +87,7 @@ def _catmull_rom(t: NDArray) -> tuple[NDArray, ...]:
 def ground_material() -> bpy.types.Material:
     """Meadow: greens and browns by noise, down to tufts and blades of a centimeter."""
     material = bpy.data.materials.new("Meadow")
-    if not material.node_tree:  # before Blender 5.0 new materials have no nodes
-        material.use_nodes = True
-    nodes, links = material.node_tree.nodes, material.node_tree.links
-    nodes.clear()
+    nodes, links = stage.cleared(material)
     place = nodes.new("ShaderNodeTexCoord")
     noise = nodes.new("ShaderNodeTexNoise")
     noise.inputs["Scale"].default_value = 0.15

@@ -53,8 +53,7 @@ def render_thumbnail(identifier: str, path: Path, day: float | None = None) -> N
         scene.tetflora.year.enabled, scene.tetflora.year.day = True, day
         run_to_end(plant_mesh.make_plant_mesh_steps(scene, graph, [empty]))
     middle, side = (low + high) / 2, max(float((high - low).max()), math.hypot(*(high - low)[:2])) * 1.06
-    camera = stage.camera(scene, middle + side * np.array([1.2, -2.4, 0.55]), middle, (SIDE, SIDE), far=10.0 * side)
-    camera.data.type, camera.data.ortho_scale = 'ORTHO', side
+    stage.camera(scene, middle + side * np.array([1.2, -2.4, 0.55]), middle, (SIDE, SIDE), far=10.0 * side, across=side)
     stage.daylight(scene, elevation=45.0, azimuth=215.0)
     scene.tetflora.refine_at_render = False
     scene.render.engine, scene.render.film_transparent = 'CYCLES', True
@@ -117,7 +116,6 @@ def main(arguments: list[str]) -> int:
                 continue
             print(f"{target.stat().st_size:>8,} {target.relative_to(session.ROOT)}", flush=True)
             large += [name] if target.stat().st_size > LARGEST else []
-    session.stop()
     if large:
         print(f"larger than {LARGEST:,} bytes: {', '.join(large)}", file=sys.stderr)
     return 1 if large else 0

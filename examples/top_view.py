@@ -15,6 +15,8 @@ from devtools.partition import partition
 from tetflora_addon.blender.scene.plants import read_plants
 from tetflora_addon.refinement import decisions
 
+from . import stage
+
 #: Colors of the lines by decision, linear RGB, and the height at which they lie, so that the rarer are on top.
 STYLES = {
     "PROXY": ((0.95, 0.45, 0.05), 2.0, 0.3),
@@ -85,13 +87,10 @@ def _add_lines(
     mesh = bpy.data.meshes.new(name)
     mesh.from_pydata(points.tolist(), [], np.arange(4 * len(lines)).reshape(-1, 4).tolist())
     material = bpy.data.materials.new(name)
-    if not material.node_tree:
-        material.use_nodes = True
-    nodes = material.node_tree.nodes
-    nodes.clear()
+    nodes, links = stage.cleared(material)
     glow, out = nodes.new("ShaderNodeEmission"), nodes.new("ShaderNodeOutputMaterial")
     glow.inputs["Color"].default_value = (*color, 1.0)
-    material.node_tree.links.new(glow.outputs[0], out.inputs["Surface"])
+    links.new(glow.outputs[0], out.inputs["Surface"])
     mesh.materials.append(material)
     scene.collection.objects.link(bpy.data.objects.new(name, mesh))
 
@@ -109,11 +108,7 @@ def _add_camera(scene: bpy.types.Scene, eye: NDArray, forward: NDArray, far: flo
     sun = bpy.data.objects.new("Top sun", bpy.data.lights.new("Top sun", 'SUN'))
     sun.data.energy = 3.0
     scene.collection.objects.link(sun)
-    scene.world = bpy.data.worlds.new("Paper")
-    if not scene.world.node_tree:
-        scene.world.use_nodes = True
-    background = next(n for n in scene.world.node_tree.nodes if n.type == 'BACKGROUND')
-    background.inputs["Color"].default_value = (1.0, 1.0, 1.0, 1.0)
+    stage.even_sky(scene)
 
 
 def _settings(scene: bpy.types.Scene, path: Path, samples: int) -> None:

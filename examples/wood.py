@@ -10,7 +10,6 @@ Every picture is refined for its own camera, from one and the same scene.
 
 from __future__ import annotations
 
-import sys
 import tempfile
 from collections.abc import Callable
 from pathlib import Path
@@ -20,13 +19,10 @@ import numpy as np
 from mathutils import Vector
 from numpy.typing import NDArray
 
-from devtools import session
-
 from . import stage
 from .close_ups import face_on_leaf, render
 from .paper.pictures import save_sheet
 
-ROOT = Path(__file__).resolve().parent.parent
 SIZE, SAMPLES = (480, 270), 32
 #: Width of a picture on the sheet, pixels.
 _CELL = 372
@@ -50,6 +46,8 @@ _SKY = 0.9
 #: Mean of the picture of what is seen from afar, which lies in the sun, and from nearer.
 _WIDE, _CLOSER = 0.4, 0.34
 _MASK = "wood"
+#: Of places x, y (n,) in meters.
+Heights = Callable[[NDArray[np.float64], NDArray[np.float64]], NDArray[np.float64]]
 
 
 def height(x: NDArray[np.float64], y: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -71,17 +69,12 @@ def build(scene: bpy.types.Scene) -> None:
 
     stage.plant(scene, "oak", 1, (0.0, 0.0, float(height(np.zeros(1), np.zeros(1))[0])), name="The oak")
     for name, side, step, hole in (("Near", NEAR, 2.5, 0.0), ("Far", LAND, 5.0, NEAR)):
-        ground = _ground(name, side, step, hole)
-        scene.collection.objects.link(ground)
-        _plant(scene, ground)
+        ground = land(scene, name, side, step, hole, height, {_MASK: wooded})
+        cover_all(scene, add_wood(scene, ground, _MASK, TREES, _APART, _DENSITY, (0.6, 1.15), _HABIT))
     stage.sun(scene, _ELEVATION, _AZIMUTH - 180.0)
     scene.world = first_forest.sky("Sky over the wood")
     background = next(node for node in scene.world.node_tree.nodes if node.type == 'BACKGROUND')
-    links, nodes = scene.world.node_tree.links, scene.world.node_tree.nodes
-    path, seen = nodes.new("ShaderNodeLightPath"), nodes.new("ShaderNodeMapRange")
-    seen.inputs["To Min"].default_value, seen.inputs["To Max"].default_value = _SKY, _SKY * _SEEN
-    links.new(path.outputs["Is Camera Ray"], seen.inputs["Value"])
-    links.new(seen.outputs[0], background.inputs["Strength"])
+    seen_less(scene.world.node_tree, background, _SKY, _SEEN)
     stage.camera(scene, _EYE, _AHEAD, near=0.01, far=2000.0)
     scene.view_settings.look = 'AgX - Medium High Contrast'
     scene.tetflora.refine_at_render = False
@@ -92,7 +85,7 @@ def grid(
     side: float,
     step: float,
     hole: float,
-    height: Callable[[NDArray[np.float64], NDArray[np.float64]], NDArray[np.float64]],
+    height: Heights,
     nearest: float = -np.inf,
 ) -> tuple[bpy.types.Mesh, NDArray[np.float64], NDArray[np.float64]]:
     """A mesh of squares with a square hole in its middle, of sides in meters, and the places x, y (n,) of its vertices.
@@ -111,33 +104,69 @@ def grid(
     return mesh, x, y
 
 
-def _ground(name: str, side: float, step: float, hole: float) -> bpy.types.Object:
-    """Land on which an attribute says where the wood is."""
+def land(
+    scene: bpy.types.Scene,
+    name: str,
+    side: float,
+    step: float,
+    hole: float,
+    height: Heights,
+    masks: dict[str, Heights],
+    nearest: float = -np.inf,
+) -> bpy.types.Object:
+    """An object as of `grid`, with an attribute for each mask, which says from 0 to 1 where something grows."""
     from tetflora_addon.blender.attributes import write
 
-    mesh, x, y = grid(name, side, step, hole, height)
-    write(mesh, _MASK, wooded(x, y).astype(np.float32))
-    return bpy.data.objects.new(name, mesh)
+    mesh, x, y = grid(name, side, step, hole, height, nearest)
+    for mask, values in masks.items():
+        write(mesh, mask, values(x, y).astype(np.float32))
+    made = bpy.data.objects.new(name, mesh)
+    scene.collection.objects.link(made)
+    return made
 
 
-def _plant(scene: bpy.types.Scene, ground: bpy.types.Object) -> None:
-    """Plant the wood on a ground, and cover all of it."""
-    from tetflora_addon.blender.placing import cover, populations
+def add_wood(
+    scene: bpy.types.Scene,
+    ground: bpy.types.Object,
+    mask: str,
+    mix: dict[str, float],
+    apart: float,
+    density: float,
+    scales: tuple[float, float],
+    habit: float,
+) -> bpy.types.PropertyGroup:
+    """Plant species with relative numbers where an attribute says, some meters apart, at most so many on a hectare."""
+    from tetflora_addon.blender.placing import populations
     from tetflora_addon.blender.species.edits import in_wood
     from tetflora_addon.blender.worker import run_to_end
 
-    depsgraph = bpy.context.evaluated_depsgraph_get()
-    wood = populations.add_population(scene, [ground], name=f"{ground.name} wood")
-    for species, weight in TREES.items():
-        entry = wood.mix.add()
-        entry.species, entry.weight = in_wood(scene, species, _HABIT), weight
-    wood.vertex_group, wood.min_distance = _MASK, _APART
-    wood.by_density, wood.density = True, _DENSITY
-    wood.scale_min, wood.scale_max, wood.seed = 0.6, 1.15, 3
-    run_to_end(populations.make_plants_steps(scene, depsgraph, wood))
+    some = populations.add_population(scene, [ground], name=f"{ground.name} {mask}")
+    for species, weight in mix.items():
+        entry = some.mix.add()
+        entry.species, entry.weight = in_wood(scene, species, habit), weight
+    some.vertex_group, some.min_distance = mask, apart
+    some.by_density, some.density = True, density
+    some.scale_min, some.scale_max, some.seed = *scales, 3
+    run_to_end(populations.make_plants_steps(scene, bpy.context.evaluated_depsgraph_get(), some))
     bpy.context.view_layer.update()
+    return some
+
+
+def cover_all(scene: bpy.types.Scene, population: bpy.types.PropertyGroup) -> None:
+    """Cover all of a population's ground."""
+    from tetflora_addon.blender.placing import cover
+    from tetflora_addon.blender.worker import run_to_end
+
     depsgraph = bpy.context.evaluated_depsgraph_get()
-    run_to_end(cover.cover_steps(scene, depsgraph, wood, masks={"vertex_group": ""}))
+    run_to_end(cover.cover_steps(scene, depsgraph, population, masks={"vertex_group": ""}))
+
+
+def seen_less(tree: bpy.types.NodeTree, background: bpy.types.ShaderNode, strength: float, seen: float) -> None:
+    """A sky of some strength that the camera sees by a factor less bright."""
+    path, factor = tree.nodes.new("ShaderNodeLightPath"), tree.nodes.new("ShaderNodeMapRange")
+    factor.inputs["To Min"].default_value, factor.inputs["To Max"].default_value = strength, strength * seen
+    tree.links.new(path.outputs["Is Camera Ray"], factor.inputs["Value"])
+    tree.links.new(factor.outputs[0], background.inputs["Strength"])
 
 
 def aim(scene: bpy.types.Scene, target: Vector, eye: Vector, lens: float) -> None:
@@ -157,8 +186,9 @@ def leaf_of_the_oak(scene: bpy.types.Scene) -> Vector:
 
 
 def render_dolly(path: Path, size: tuple[int, int] = SIZE, samples: int = SAMPLES) -> None:
-    """Eight pictures from 400 m to the leaf, as a sheet of two rows."""
+    """Eight pictures from 400 m to the leaf, as a sheet of two rows; in an empty scene."""
     scene = bpy.context.scene
+    build(scene)
     leaf = leaf_of_the_oak(scene)
     with tempfile.TemporaryDirectory() as folder:
         cells = []
@@ -170,15 +200,5 @@ def render_dolly(path: Path, size: tuple[int, int] = SIZE, samples: int = SAMPLE
         save_sheet(cells, 4, path, _CELL)
 
 
-def main() -> int:
-    """Render the sheet."""
-    given = stage.words(__doc__, ROOT / "docs" / "images" / "dolly.jpg", SIZE, SAMPLES).parse_args()
-    session.start()
-    session.clean_file()
-    build(bpy.context.scene)
-    render_dolly(given.out, stage.size_of(given, SIZE), given.samples)
-    return 0
-
-
 if __name__ == "__main__":
-    sys.exit(main())
+    stage.make_picture(__doc__, "dolly.jpg", SIZE, SAMPLES, render_dolly)

@@ -16,7 +16,7 @@ from ..tetflora_addon.blender.biomes.files import active_biome, import_biome, re
 from ..tetflora_addon.blender.biomes.files import save_biome as save_biome_file
 from ..tetflora_addon.blender.biomes.library import BIOMES, NO_BIOME, biomes
 from ..tetflora_addon.blender.declare import boolean, choice, once, string
-from ..tetflora_addon.blender.placing import cover
+from ..tetflora_addon.blender.placing import cover, populations
 from ..tetflora_addon.blender.placing.first_forest import is_startup
 from ..tetflora_addon.blender.placing.populations import PlacedPlants, make_plants_steps, remove_layer, reroll_steps
 from ..tetflora_addon.blender.placing.rules import active_population, grounds_of, set_grounds
@@ -171,8 +171,7 @@ class TETFLORA_OT_update_layers(_InParts, Operator, label="Update", needs=_ACTIV
         if layer.kind == FIELD:
             if not growing.is_stand(layer.field):
                 raise SceneError(f'"{layer.name}" has no rules to grow again by; use the brush, or edit its points')
-            if layer.frozen:
-                raise SceneError(f'"{layer.name}" is frozen and keeps its plants; turn off Freeze to change it')
+            populations.refuse_frozen(layer)
             if self.reroll:
                 layer.field.tetflora.stand.seed += 1
             return growing.again_steps(layer.id_data, depsgraph, layer.field)

@@ -17,6 +17,7 @@ import sys
 import time
 from pathlib import Path
 
+from benchmarks.report import head, report
 from devtools import session
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -42,8 +43,6 @@ def say(text: str) -> None:
 def make(name: str) -> None:
     """Make one figure in this process, and write its record."""
     session.start()
-    from benchmarks.report import report  # after the session has prepared Blender
-
     OUT.mkdir(parents=True, exist_ok=True)
     IMAGES.mkdir(parents=True, exist_ok=True)
     RECORDS.mkdir(parents=True, exist_ok=True)
@@ -56,19 +55,11 @@ def make(name: str) -> None:
 
 def is_made(name: str) -> bool:
     """Whether this commit has made a figure; images that it wrote into the repository do not count as a change."""
-    return _record(name).exists() and json.loads(_record(name).read_text())["commit"].rstrip("+") == _commit()
+    return _record(name).exists() and json.loads(_record(name).read_text())["commit"].rstrip("+") == head()
 
 
 def _record(name: str) -> Path:
     return RECORDS / f"{name}.json"
-
-
-def _commit() -> str:
-    command = ["git", "-C", str(ROOT), "rev-parse", "--short", "HEAD"]
-    try:
-        return subprocess.run(command, capture_output=True, text=True, check=True).stdout.strip()
-    except (OSError, subprocess.CalledProcessError):
-        return ""  # outside of a repository: as `benchmarks.report.commit`
 
 
 def main() -> int:
@@ -87,7 +78,6 @@ def main() -> int:
         parser.error(f"there is no {name!r}; known are {', '.join(FIGURES)} and tables")
     if arguments.here:
         make(*names)
-        session.stop()
         return 0
     wanted = [n for n in names if n in FIGURES] if names else [n for n in FIGURES if not is_made(n)]
     failed = []

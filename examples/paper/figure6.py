@@ -15,13 +15,13 @@ from pathlib import Path
 import bpy
 
 from benchmarks.pictures import difference, plant_mask
-from tetflora_addon.blender import compat
 
+from .. import stage
 from .pictures import save_sheet
 from .scenes import paper_figures, refined, rendered, row
 
 #: Linear colors of what is real and of what stands for it, and of everything else.
-REAL, PROXY, REST = (0.02, 0.16, 0.55, 1.0), (0.95, 0.32, 0.02, 1.0), (0.55, 0.55, 0.52, 1.0)
+REAL, PROXY, REST = (0.02, 0.16, 0.55), (0.95, 0.32, 0.02), (0.55, 0.55, 0.52)
 
 
 def make(out: Path, images: Path, small: bool) -> dict[str, float]:
@@ -71,7 +71,7 @@ def _kinds(scene: bpy.types.Scene, both: Path, real: Path, samples: int) -> dict
     made = [o for o in scene.objects if o.data and "tetflora_kind" in o]
     proxies = [o for o in made if o["tetflora_kind"] == "proxy"]
     surfaces = [o for o in scene.objects if o.type in {'MESH', 'POINTCLOUD'}]
-    proxy, polygon, rest = (_plain(color) for color in (PROXY, REAL, REST))
+    proxy, polygon, rest = (stage.dull("Kind", color) for color in (PROXY, REAL, REST))
     for shown in surfaces:
         for number in range(len(shown.data.materials)):
             shown.data.materials[number] = proxy if shown in proxies else polygon if shown in made else rest
@@ -92,14 +92,3 @@ def _amount(data: bpy.types.ID) -> int:
     if isinstance(data, bpy.types.Mesh):
         return len(data.polygons) or len(data.vertices)
     return len(data.points)
-
-
-def _plain(color: tuple[float, float, float, float]) -> bpy.types.Material:
-    """A dull surface of one color."""
-    material = bpy.data.materials.new("Kind")
-    tree = compat.shader_tree(material)
-    tree.nodes.clear()
-    diffuse, output = tree.nodes.new("ShaderNodeBsdfDiffuse"), tree.nodes.new("ShaderNodeOutputMaterial")
-    diffuse.inputs["Color"].default_value = color
-    tree.links.new(diffuse.outputs[0], output.inputs[0])
-    return material

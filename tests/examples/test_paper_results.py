@@ -192,9 +192,9 @@ def test_the_documentation_has_a_place_for_each_table_and_all_pictures():
 def test_only_what_this_commit_has_not_made_is_made(tmp_path, monkeypatch):
     command = importlib.import_module("examples.paper.__main__")
     monkeypatch.setattr(command, "RECORDS", tmp_path)
-    monkeypatch.setattr(command, "_commit", lambda: "abc")
+    monkeypatch.setattr(command, "head", lambda: "abc")
     assert not command.is_made("figure8")
     _records(tmp_path, {"figure8": {}})
     assert command.is_made("figure8")
-    monkeypatch.setattr(command, "_commit", lambda: "def")
+    monkeypatch.setattr(command, "head", lambda: "def")
     assert not command.is_made("figure8")

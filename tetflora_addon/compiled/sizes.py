@@ -453,19 +453,19 @@ def _likely(rows: Table, stems: list[tuple[Branches, Axes]], n: int) -> list[tup
     tips = np.concatenate([tip for *_, tip in found])
     order = np.argsort(tree, kind="stable")
     number = np.bincount(tree, minlength=n)
-    place = np.arange(len(tree)) - (np.cumsum(number) - number)[tree[order]]
+    of, place = spread(number)
     most = int(number.max(initial=0))
     chosen = np.zeros((n, most), bool)
     if most > max(_LIKELY):
         for way, likely in enumerate(_LIKELY):
             padded = np.full((n, most), -np.inf, np.float32)
-            padded[tree[order], place] = tips[order, way]
+            padded[of, place] = tips[order, way]
             best = np.argpartition(padded, most - likely, axis=1)[:, most - likely :]
             np.put_along_axis(chosen, best, True, axis=1)
     else:
         chosen[:] = True
     some = np.zeros(len(tree), bool)
-    some[order] = chosen[tree[order], place]
+    some[order] = chosen[of, place]
     out, start = [], 0
     for counts, owner, index, _ in found:
         mine = np.flatnonzero(some[start : start + len(owner)])

@@ -446,9 +446,9 @@ def _groups(place: Floats, group: Integers, number: int) -> tuple[Integers, Floa
     """Each group of things (n,) at places (n,) divided into so many of equally many: which (n,), and how wide (k,)."""
     order = np.lexsort((place, group))
     count = np.bincount(group)
-    rank = np.arange(len(place)) - (np.cumsum(count) - count)[group[order]]
+    own, rank = spread(count)
     out = np.empty(len(place), np.int64)
-    out[order] = group[order] * number + rank * number // count[group[order]]
+    out[order] = own * number + rank * number // count[own]
     many = np.bincount(out, minlength=len(count) * number)
     low, high = np.full(len(many), np.inf), np.full(len(many), -np.inf)
     np.minimum.at(low, out, place)

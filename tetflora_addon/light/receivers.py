@@ -14,7 +14,7 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import GOLDEN_TURN, Arrays, Floats, Integers, Mask, spiral
+from ..arrays import GOLDEN_TURN, Arrays, Floats, Integers, Mask, spiral, spread
 from ..compiled.flora import Flora
 from ..optics import recollision_albedo
 from ..parallel import blocks
@@ -197,9 +197,8 @@ class SurfaceElements:
         key = np.arange(4 * len(clouds))
         key = key[~self.replaced[key // 4]]
         order = np.argsort(self.cell, kind="stable")
-        cell = self.cell[order]
-        counts = np.bincount(cell, minlength=len(clouds))
-        place = np.arange(len(cell)) - (np.cumsum(counts) - counts)[cell]
+        counts = np.bincount(self.cell, minlength=len(clouds))
+        cell, place = spread(counts)
         # Evenly among those of a tetrahedron, in whatever order they come.
         most = int(np.clip(ALL_SAMPLES // max(len(clouds), 1), 1, SAMPLES))
         step = np.maximum(-(-counts[cell] // most), 1)

@@ -3,8 +3,8 @@
 """Functions called in other processes, one for each thread of `parallel`, with what all calls share sent once.
 
 numpy lets go of the interpreter's lock while it computes, but what calls it does not: with the engine's blocks, two
-threads gain about a tenth. ``python -m benchmarks scaling`` tells what processes gain. Where no other Python can be
-started, or several have died at their work, it is done here instead, and `tell` says so once: results are the same.
+threads gain about a tenth. Where no other Python can be started, or several have died at their work, it is done here
+instead, and `tell` says so once: results are the same.
 
 A process belongs to the thread that calls a function in it, and to nobody between two calls. Only its owner, or who
 holds the lock where it has none, writes to it or closes its pipes; anybody may kill it.
