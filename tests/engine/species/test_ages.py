@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -19,7 +20,7 @@ from tetflora_addon.growth.rows import DEAD_ORDER
 from tetflora_addon.species.ages import STAGES, ages_of, stage, with_age
 from tetflora_addon.species.catalog import load_species, species_from_dict
 from tetflora_addon.species.members import expected_leaf_area, expected_members, expected_polygons
-from tetflora_addon.species.species import grown
+from tetflora_addon.species.species import Bud, grown
 
 TREES = [name for name in support.SPECIES if not ages_of(load_species(name)).scaled]
 #: Fractions of the full age, then ages in lifespans.
@@ -163,6 +164,8 @@ def test_what_has_no_wood_only_grows_in_size() -> None:
     assert half.orders[1].leaf_size.mean == pytest.approx(ratio * species.orders[1].leaf_size.mean)
     assert half.orders[1].leaves == species.orders[1].leaves
     assert with_age(species, 40.0) is species
+    budded = replace(species, bud=Bud())
+    assert with_age(budded, 0.3).bud.length == pytest.approx(ratio * budded.bud.length)
 
 
 @pytest.mark.parametrize(
