@@ -20,6 +20,7 @@ from tetflora_addon.growth.rows import DEAD_ORDER
 from tetflora_addon.species.ages import STAGES, ages_of, stage, with_age
 from tetflora_addon.species.catalog import load_species, species_from_dict
 from tetflora_addon.species.members import expected_leaf_area, expected_members, expected_polygons
+from tetflora_addon.species.skeletons import Skeleton
 from tetflora_addon.species.species import Bud, grown
 
 TREES = [name for name in support.SPECIES if not ages_of(load_species(name)).scaled]
@@ -166,6 +167,15 @@ def test_what_has_no_wood_only_grows_in_size() -> None:
     assert with_age(species, 40.0) is species
     budded = replace(species, bud=Bud())
     assert with_age(budded, 0.3).bud.length == pytest.approx(ratio * budded.bud.length)
+
+
+def test_what_was_drawn_only_grows_in_size() -> None:
+    drawn = Skeleton(np.array([[0.0, 0.0, 0.0], [0.0, 0.0, 6.0], [1.0, 0.0, 8.0]]), np.ones(3) / 4, np.array([-1, 0, 1]))
+    species = replace(load_species("birch"), skeleton=drawn)
+    half = with_age(species, 10.0).skeleton
+    ratio = half.radius[0] / drawn.radius[0]
+    assert 0.1 < ratio < 1
+    assert half.points == pytest.approx(ratio * drawn.points)
 
 
 @pytest.mark.parametrize(
