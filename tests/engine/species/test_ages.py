@@ -170,7 +170,9 @@ def test_what_has_no_wood_only_grows_in_size() -> None:
 
 
 def test_what_was_drawn_only_grows_in_size() -> None:
-    drawn = Skeleton(np.array([[0.0, 0.0, 0.0], [0.0, 0.0, 6.0], [1.0, 0.0, 8.0]]), np.ones(3) / 4, np.array([-1, 0, 1]))
+    drawn = Skeleton(
+        np.array([[0.0, 0.0, 0.0], [0.0, 0.0, 6.0], [1.0, 0.0, 8.0]]), np.ones(3) / 4, np.array([-1, 0, 1])
+    )
     species = replace(load_species("birch"), skeleton=drawn)
     half = with_age(species, 10.0).skeleton
     ratio = half.radius[0] / drawn.radius[0]
