@@ -8,6 +8,7 @@ import ctypes
 import math
 import sys
 from mmap import mmap
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -54,6 +55,38 @@ def test_what_is_left_is_the_limit_less_all_that_others_take(monkeypatch):
 def test_structures_of_other_systems_have_their_sizes():
     sizes = {memory._Task: 48, memory._Status: 64, memory._Counters: 8 + 8 * ctypes.sizeof(ctypes.c_size_t)}
     assert {kind: ctypes.sizeof(kind) for kind in sizes} == sizes
+
+
+@pytest.mark.parametrize(
+    ("system", "asked"),
+    [("linux", {"malloc_trim"}), ("darwin", {"malloc_zone_pressure_relief"}), ("win32", set())],
+)
+def test_each_system_is_asked_in_its_own_words_to_take_memory_back(monkeypatch, system, asked):
+    called = set()
+
+    class Library:
+        def __init__(self, _name):
+            pass
+
+        def __getattr__(self, name):
+            return lambda *_: called.add(name)
+
+    monkeypatch.setattr(sys, "platform", system)
+    monkeypatch.setattr(ctypes, "CDLL", Library)
+    memory.give_back()
+    assert called == asked
+
+
+def test_windows_is_asked_about_this_process(monkeypatch):
+    class Kernel:
+        def K32GetProcessMemoryInfo(self, process, counters, length):  # noqa: N802
+            assert ctypes.c_ssize_t(process.value).value == -1
+            assert length == ctypes.sizeof(counters._obj)
+            counters._obj.working_set = 123
+            return 1
+
+    monkeypatch.setattr(ctypes, "windll", SimpleNamespace(kernel32=Kernel()), raising=False)
+    assert memory._windows_resident() == 123
 
 
 @pytest.mark.parametrize("failure", [OSError, ValueError, AttributeError])

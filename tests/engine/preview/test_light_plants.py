@@ -11,7 +11,9 @@ import pytest
 
 from tests.engine import support
 from tetflora_addon.compiled.flora import compile_species
+from tetflora_addon.growth.seasons import Season
 from tetflora_addon.preview import light_plants
+from tetflora_addon.species.catalog import load_species
 from tetflora_addon.species.species import Range
 
 #: Species, and how far to the east.
@@ -79,3 +81,23 @@ def test_points_of_two_kinds_are_joined_with_their_looks() -> None:
     feet = np.concatenate([one.position for one in seeds])
     np.testing.assert_allclose(whole.crowns.positions + whole.origin, feet, atol=1e-3)
     assert whole.plants == 60
+
+
+def test_faces_of_two_kinds_are_joined_with_their_own_corners() -> None:
+    flora, places = support.flora(), np.random.default_rng(6).uniform(-9.0, 9.0, (4, 3))
+    seeds = [support.plants(np.arange(4), support.SPECIES.index(name), places + x, 1.0) for name, x in KINDS]
+    parts = [light_plants.light_plants(flora, one) for one in seeds]
+    assert all(part.crowns is None for part in parts)
+    whole = light_plants.joined(parts)
+    corners = [part.positions[part.indices] + part.origin for part in parts]
+    np.testing.assert_allclose(whole.positions[whole.indices] + whole.origin, np.concatenate(corners), atol=1e-4)
+    assert np.array_equal(light_plants.joined(parts[1:]).positions, parts[1].positions)
+
+
+def test_crowns_are_never_larger_than_in_summer_and_smallest_without_leaves() -> None:
+    flora = compile_species([load_species("birch")])
+    summer = light_plants.crown_areas(flora)
+    areas = [light_plants.crown_areas(flora.in_year(Season(day))) / summer for day in (15.0, 120.0, 200.0, 290.0)]
+    assert max(areas) <= 1.0 + 1e-9
+    assert areas[0] == pytest.approx(light_plants._BARE, abs=0.02)
+    assert areas[2] > 0.95
