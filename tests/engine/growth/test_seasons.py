@@ -27,7 +27,7 @@ from tetflora_addon.growth.seasons import (
     seasonal_rows,
 )
 from tetflora_addon.growth.wind import Wind
-from tetflora_addon.species.catalog import load_species, species_from_dict
+from tetflora_addon.species.catalog import species_from_dict
 from tetflora_addon.species.species import DAYS, LeafYear, Species, Year
 from tetflora_addon.subplants.leaf_meshes import leaf_meshes
 from tetflora_addon.subplants.pieces import expand
@@ -129,16 +129,6 @@ def test_plants_are_what_is_expected_of_them(leaf: LeafYear, day: float) -> None
     if area > 0.2 * summer[0]:
         mean = wanted @ flora.leaf_colors(plants) / wanted.sum()
         np.testing.assert_allclose(color, mean, atol=0.03)
-
-
-@pytest.mark.parametrize("kind", [0, 1])
-def test_leaves_and_blossoms_have_the_colors_of_their_own_kind(kind: int) -> None:
-    flora = compile_species([load_species("cherry_blossom")]).in_year(Season(285.0))
-    plants, owner, summer = support.trunks(flora.rows, support.plants(np.arange(3))), np.array([2, 0, 1]), np.eye(3)
-    one, other = (flora.day.own_colors(plants, np.full(3, of), summer[owner])[owner] for of in (kind, 1 - kind))
-    found = flora.day.own_colors(plants, np.full(3, kind), summer[owner][owner], owner)
-    np.testing.assert_allclose(found, one)
-    assert np.abs(found - other).max() > 0.01
 
 
 @settings(deadline=None, max_examples=25)
