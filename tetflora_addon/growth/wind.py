@@ -83,7 +83,7 @@ class Wind:
         "Speed",
         "Mean speed in meters per second: 2 stirs leaves, 4 is a gentle breeze, 10 sways trees, 20 is a gale. Animate "
         "it slowly: plants react at once",
-        **within(0.0, 25.0, 100.0),
+        **within(0.0, 25.0, 100.0) | {"unit": 'VELOCITY'},
     )
     #: Radians from +x toward +y.
     direction: float = setting(
