@@ -119,8 +119,7 @@ def _unseen(scene: bpy.types.Scene, statistics: Statistics) -> str:
     )
 
 
-# Meshes stay hidden where results were deleted by hand. Only then are all objects looked through: a panel asks at every
-# movement of the mouse.
+# Meshes stay hidden where results were deleted by hand. Only then are all objects looked through: panels ask often.
 _clearable = base.need(
     lambda context: (
         has_results(context.scene) or (context.scene.tetflora.statistics and hiding.hidden_originals(context.scene))
@@ -192,8 +191,7 @@ _camera_found = base.need(
 
 
 class TETFLORA_OT_preview_levels(base.ModalJob, Operator, label="Compute Levels", needs=(_camera_found,)):
-    """Refine for the scene camera, or the frozen one, without creating meshes, and keep every level to step through in
-    viewports.
+    """Refine for the scene camera, or the frozen one, without creating meshes, and keep every level for viewports.
 
     Takes as long as the first part of Refine; Esc cancels and keeps the previous levels.
     """

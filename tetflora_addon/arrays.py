@@ -3,8 +3,7 @@
 """Structures of arrays: many things of one kind, with one array for each of their properties.
 
 Vectors are (n, 3) and frames (n, 3, 3), but memory holds one component of all n after the other. Arithmetic on such
-arrays runs along n without strides, and its results keep the layout. Only indexing and stacking have to take care of
-it; the functions below do.
+arrays runs along n without strides, and its results keep the layout. Indexing and stacking do by the functions below.
 
 Where things come and go in small steps, what that costs goes with what changes, not with what is there: `Growing` has
 room to spare and is changed in place, for few columns that are looked at all the time. `Chunks` only collects, for many

@@ -39,8 +39,7 @@ def stored_properties(owner: bpy.types.ID) -> Any | None:
 def shader_tree(owner: bpy.types.Material | bpy.types.World | bpy.types.Light) -> bpy.types.NodeTree:
     """Node tree of a material, world or light, made if there is none.
 
-    From 5.0 on new datablocks have one from the start, and touching ``use_nodes`` warns of its removal; 4.5 makes the
-    tree when ``use_nodes`` is set.
+    From 5.0 on new datablocks have one, and touching ``use_nodes`` warns of its removal; 4.5 makes it when that is set.
     """
     if owner.node_tree is None:
         owner.use_nodes = True

@@ -429,6 +429,16 @@ def complain(text: str) -> None:
     _in_window(lambda: bpy.context.window_manager.popup_menu(draw, title="TetFlora", icon='ERROR'))
 
 
+def show_status(text: str | None = None) -> None:
+    """Show a text in status bars, and its beginning above pictures that are rendered, or again what is usual there."""
+    for window in bpy.context.window_manager.windows:
+        with bpy.context.temp_override(window=window):
+            window.workspace.status_text_set(text)
+        for area in window.screen.areas:
+            if area.type == 'IMAGE_EDITOR' and getattr(area.spaces.active.image, "type", "") == 'RENDER_RESULT':
+                area.header_text_set(text and text.partition("   |")[0])
+
+
 def open_menu(identifier: str) -> None:
     """Open a menu under the cursor, if there is a window."""
     _in_window(lambda: bpy.ops.wm.call_menu(name=identifier))

@@ -186,8 +186,7 @@ _OPEN = {"proxy_kind"}
 def check_limits(group: bpy.types.PropertyGroup, owner: str) -> None:
     """Refuse numbers and choices that no slider and no menu gives.
 
-    Scripts that write custom properties, and files of any origin, can store them past Blender's own checks, and Blender
-    takes nan for any number.
+    Scripts that write custom properties, and files, can store them past Blender's checks, and Blender accepts nan.
 
     Parameters
     ----------

@@ -11,8 +11,7 @@ than full-grown are old only if they are as thick.
 
 Where a stand grows in an animation, plants must not jump from class to class. There, plants that are born, die and end
 up alike are a *cohort*: one kind, whose age goes on as those of its plants do on the mean; scales make up for the
-difference in height. What a plant belongs to follows from its whole life and not from the present year, so that a frame
-alone is that of the film.
+difference in height. What a plant belongs to follows from its whole life, so that a frame alone is that of the film.
 """
 
 from collections.abc import Callable

@@ -9,8 +9,7 @@ at the twigs, as in "Physically Guided Animation of Trees" (Habel, Kusternig and
 move by themselves keep real trees from swaying like poles is shown in "Mechanical stability of trees under
 dynamic loads" (James, Haritos and Ades, 2006).
 
-Rows of a flora in the wind have the columns of `WIND_COLUMNS` besides; others have not, and nothing here costs them
-anything.
+Rows of a flora in the wind have the columns of `WIND_COLUMNS` besides; others have not, and pay nothing for them.
 """
 
 from dataclasses import dataclass

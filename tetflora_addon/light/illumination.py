@@ -437,8 +437,7 @@ def baked_attributes(
 ) -> Mapping[str, tuple[str, Floats32]]:
     """Attributes of baked light on a domain 'FACE' or 'POINT', in the layout of `buffers.MeshBuffers`.
 
-    ``front`` (n, 3) is the linear radiance of the side to which normals point, ``back`` that of the other; by default
-    both are the same.
+    ``front`` (n, 3) is the linear radiance of the side to which normals point, ``back`` that of the other, or the same.
     """
     back = front if back is None else back
     return {FRONT: (domain, front.astype(np.float32)), BACK: (domain, back.astype(np.float32))}

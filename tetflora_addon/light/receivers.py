@@ -3,8 +3,7 @@
 """What receives and blocks light: tetrahedra as clouds, and sheets, which are facets and leaves as they are drawn.
 
 Leaves sit in clusters, and so do the facets that stand for them: half of the light that an even cloud would let
-through to its surfaces does not reach those of a crown. Where sheets are drawn, they cast shadows in place of their
-tetrahedra.
+through to its surfaces does not reach those of a crown. Sheets that are drawn cast shadows, not their tetrahedra.
 """
 
 from dataclasses import dataclass, replace

@@ -23,7 +23,7 @@ _ENTRIES = 3_000_000  # about as many pieces of lines are noted in the cells
 def inside_any(points: Floats, polygons: Sequence[Floats]) -> Mask:
     """Which points (n, 2) lie in at least one polygon, (n,).
 
-    Polygons (k, 2) are closed: the last corner is followed by the first. Where one crosses itself, what is wound twice
+    Polygons (k, 2) are closed: after the last corner comes the first. Of one that crosses itself, what is wound twice
     is outside.
     """
     inside = np.zeros(len(points), bool)
@@ -66,8 +66,7 @@ def _inside(points: Floats, polygon: Floats) -> Mask:
 class Lines:
     """Straight pieces on the map, noted in the cells of a grid within their reach.
 
-    A cell keeps only pieces that can be the nearest of any point in it, so that a long border costs no more than a
-    short one.
+    A cell keeps only pieces that can be the nearest of a point in it: a long border costs no more than a short one.
     """
 
     def __init__(self, start: Floats, end: Floats, reach: Floats) -> None:

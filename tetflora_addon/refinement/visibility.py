@@ -4,8 +4,7 @@
 
 The paper draws the tree front to back and reads an alpha buffer along the way. Since optical depths add up, the same
 numbers come from sorting all fragments by pixel and front-to-back rank: what stands before a fragment is a cumulative
-sum within its pixel. No pixel is visited in a loop. A tetrahedron is drawn once; its fragments stay until it is
-divided.
+sum within its pixel. No pixel is visited in a loop. A tetrahedron's fragments stay until it is divided.
 
 Panoramas have six square views, the faces of a cube, with an alpha buffer each. The views have one eye, so that the
 tree's front-to-back order is that of all of them. What a tetrahedron affects is summed over the faces: the solid angle

@@ -2,8 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Grow a stand: year after year plants shade each other, grow, die, fall, and seeds of the others come up.
 
-All random numbers are hashes of the seed, the plant and the year, and sums are of whole numbers: the stand is the same
-whatever the number of threads.
+Random numbers are hashes of seed, plant and year, and sums are of whole numbers: any number of threads gives the same.
 
 Wood grows in proportion to the light that leaves take, less what the leaves cost (Monteith, "Climate and the efficiency
 of crop production in Britain", 1977). Trunks grow taller for their basal diameter where it is dark beside them, crowns

@@ -2,8 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Leaves as polygons: copies of the species' leaf models, written straight into the arrays of their mesh.
 
-See section 5 of the paper. What is small in the image may be a kite, and what is large has finer levels, see
-`leaves.levels`.
+See section 5 of the paper. What is small in the image may be a kite; what is large has levels, see `leaves.levels`.
 """
 
 from collections.abc import Callable, Iterator, Sequence

@@ -69,8 +69,7 @@ _MANY = 1e6
 class _Run:
     """One refinement: what it reads, what it has made of that, and where results go.
 
-    The camera and the contents are None until they are read; ``beside`` are earlier results that stay, ``originals``
-    objects whose place results take.
+    Camera and contents are None until read; ``beside`` are earlier results that stay, ``originals`` what they replace.
     """
 
     depsgraph: bpy.types.Depsgraph
@@ -460,9 +459,14 @@ def _replace(run: _Run) -> None:
     results.finish()
 
 
-def refine(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, **options: object) -> Statistics:
-    """Refine a scene at once; options and errors as for `refine_steps`."""
-    return run_to_end(refine_steps(scene, depsgraph, **options))
+def refine(
+    scene: bpy.types.Scene,
+    depsgraph: bpy.types.Depsgraph,
+    tell: Callable[[Progress], None] = lambda _: None,
+    **options: object,
+) -> Statistics:
+    """Refine a scene at once, and tell how far it is; other options and errors as for `refine_steps`."""
+    return run_to_end(mapped(refine_steps(scene, depsgraph, **options), tell))
 
 
 def clear(scene: bpy.types.Scene, for_render: bool | None = None) -> int:

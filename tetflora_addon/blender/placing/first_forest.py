@@ -2,8 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The first forest: rolling ground, some ninety plants, a camera, the sun and a sky, with plain node trees.
 
-An empty scene, or one as Blender starts with, is used and nothing in it is removed. Otherwise the forest gets a new
-scene.
+An empty scene, or one as Blender starts with, is used and nothing in it is removed. Else the forest gets a new scene.
 """
 
 from dataclasses import dataclass

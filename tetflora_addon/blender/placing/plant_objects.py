@@ -324,8 +324,7 @@ def note_field(scene: bpy.types.Scene, field: bpy.types.Object) -> None:
 def prepare_scene(scene: bpy.types.Scene) -> None:
     """Settings that a scene with plants needs.
 
-    Refinement changes the scene while it renders; with Blender's interface unlocked, the window would draw the same
-    data at that time and could crash.
+    Refinement changes the scene while it renders; a window that is not locked would draw that data and could crash.
     """
     scene.render.use_lock_interface = True
     scene.tetflora.version = VERSION

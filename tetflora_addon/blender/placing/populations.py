@@ -3,8 +3,7 @@
 """Populations of a scene: plants that were placed together, and can be placed again by the stored rules.
 
 A plant or field stores the identity of its population and its number in it, so names and places in lists do not matter.
-A copy made by hand has the number of its original: the oldest with a number belongs to the population, the others are
-the artist's.
+A copy made by hand has its original's number: the oldest with a number is the population's, the others the artist's.
 """
 
 import uuid

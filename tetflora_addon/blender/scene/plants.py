@@ -59,8 +59,7 @@ def read_plants(
 ) -> tuple[Seeds, tuple[tuple[str, int], ...], str]:
     """Enabled plants of a view layer that render: single ones by name, then instances, then fields.
 
-    Plants and fields that collections or geometry nodes instance take part; each instance becomes an individual of its
-    own.
+    Plants and fields that collections or geometry nodes instance take part; each instance is an individual of its own.
 
     A plant has the direction of its z axis, the azimuth of its x axis, and the mean of its absolute scales: plants are
     neither stretched nor mirrored. With motion blur they are where they are in the middle of the exposure, and have
