@@ -167,8 +167,7 @@ def widest_sway(rows: Table) -> Floats:
 def sway(rows: Table, branches: Branches, ahead: float = 0.0) -> Floats:
     """Rotation vectors (n, 3), radians, of branches' tips against their bases.
 
-    For plants drawn by hand ``branches`` are the whole plants: where they stand, and which way is up; what comes out is
-    for each meter of height at scale 1.
+    For plants drawn by hand ``branches`` are whole plants, and what comes out is for each meter of height at scale 1.
 
     Parameters
     ----------

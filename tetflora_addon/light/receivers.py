@@ -95,8 +95,7 @@ class MediumCells(Arrays):
         """Mean (n,) over all directions of κ, 1/m.
 
         Within 1.3 % of the integral, which single orientations reach: a mean over points of a Fibonacci lattice on the
-        half sphere; κ(ω) = κ(−ω). The form of κ is that of Heitz, Dupuy, Crassin and Dachsbacher, "The SGGX Microflake
-        Distribution", 2015.
+        half sphere; κ(ω) = κ(−ω). The form of κ is that of Heitz et al., "The SGGX Microflake Distribution", 2015.
         """
         index, result = np.arange(_DIRECTIONS) + 0.5, np.zeros(len(self))
         basis = _quadratic(spiral(index / _DIRECTIONS, index, GOLDEN_TURN)).T

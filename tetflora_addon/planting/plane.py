@@ -23,8 +23,7 @@ _ENTRIES = 3_000_000  # about as many pieces of lines are noted in the cells
 def inside_any(points: Floats, polygons: Sequence[Floats]) -> Mask:
     """Which points (n, 2) lie in at least one polygon, (n,).
 
-    Polygons (k, 2) are closed: after the last corner comes the first. Of one that crosses itself, what is wound twice
-    is outside.
+    Polygons (k, 2) are closed. Of one that crosses itself, what is wound twice is outside.
     """
     inside = np.zeros(len(points), bool)
     for polygon in polygons:
@@ -191,8 +190,7 @@ class Neighbors:
 class Spacing:
     """Keeps points apart with a grid whose cells hold one point at most.
 
-    Cells are as large as the distance is on their diagonal, so two points of a cell are always too close, and points
-    that are too close lie at most two cells apart.
+    The diagonal of cells is the distance: two points of a cell are too close, and such points at most two cells apart.
 
     Attributes
     ----------

@@ -39,8 +39,7 @@ _ACROSS = 8.0
 def depth_in_front(pixel: Integers, depth: Floats) -> tuple[Integers, NDArray]:
     """First fragment of its pixel, and optical depth before it, for each of fragments (n,).
 
-    Fragments are sorted by ``pixel`` and front to back. What all earlier pixels hold is subtracted again from one
-    cumulative sum; rounding must not leave less than nothing.
+    Fragments are sorted by ``pixel`` and front to back. Of one cumulative sum, what earlier pixels hold is subtracted.
     """
     summed = np.cumsum(depth)
     begins = np.flatnonzero(np.diff(pixel, prepend=-1))
@@ -89,8 +88,7 @@ class AlphaBuffer:
         self.width, self.height = buffer_size(camera, resolution)
         self.end = occluders_depth
         self._cell, self._pixel = np.zeros((2, 0), np.int32)
-        # Optical depth that a fragment brings into its pixel, the visible fraction of its tetrahedron that it covers,
-        # and the transmittance of what is before it.
+        # Optical depth of a fragment, the visible fraction of its tetrahedron that it covers, and transmittance before.
         self._depth, self._fraction, self._before = np.zeros((3, 0))
         self._changed = np.zeros(self.width * self.height, bool)
 

@@ -531,8 +531,7 @@ class StandSettings:
 def grow(site: StandSite, species: Sequence[StandSpecies], settings: StandSettings) -> Job[Records]:
     """Grow a stand; a job, which yields after each year and returns its records.
 
-    These are of plants at year 0, each ``interval`` years, at the end, and whenever one appears, dies, falls or is
-    gone; with an interval of 0 those of the end alone.
+    Of plants at year 0, each ``interval`` years (0: only at the end), and whenever one appears, dies, falls or is gone.
 
     Raises
     ------

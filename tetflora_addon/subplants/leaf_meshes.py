@@ -34,8 +34,7 @@ class LeafCopies:
     Parameters
     ----------
     of : LeafModel, LeafKites or LeafLevel
-        A model; kites that stand for one, of which keys choose a plane; or a finer level, of which they choose a
-        variant, and which is shaded smooth.
+        A model; kites for one, of which keys choose a plane; or a finer, smooth level, of which they choose a variant.
     number : int
         Of copies in the end, at most.
     transmission : float

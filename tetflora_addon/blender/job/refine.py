@@ -4,8 +4,7 @@
 
 The engine works in a thread beside Blender's (`worker`); only reading and writing datablocks happens here.
 
-While Blender takes one block of polygons over, the engine makes the next in its thread. Instances of assets are
-originals where they are whole, and meshes of clusters where some of them are near.
+While Blender takes one block over, the engine makes the next. Instances of assets are originals or meshes of clusters.
 """
 
 import json
@@ -13,6 +12,7 @@ from collections.abc import Callable, Generator, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from itertools import groupby
+from typing import Any
 
 import bpy
 import numpy as np
@@ -459,13 +459,9 @@ def _replace(run: _Run) -> None:
     results.finish()
 
 
-def refine(
-    scene: bpy.types.Scene,
-    depsgraph: bpy.types.Depsgraph,
-    tell: Callable[[Progress], None] = lambda _: None,
-    **options: object,
-) -> Statistics:
-    """Refine a scene at once, and tell how far it is; other options and errors as for `refine_steps`."""
+def refine(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, **options: Any) -> Statistics:
+    """Refine a scene at once; ``tell`` gets the progress of each step, other options and errors are `refine_steps`'."""
+    tell = options.pop("tell", lambda _: None)
     return run_to_end(mapped(refine_steps(scene, depsgraph, **options), tell))
 
 

@@ -58,8 +58,7 @@ def tread(material: bpy.types.Material) -> None:
 def sky(name: str) -> bpy.types.World:
     """Blue above, pale at the horizon.
 
-    What it sheds on the ground has the color of daylight of 15,000 K, as under a clear sky, and a quarter of the sun's
-    strength: shade is cool, not blue-black.
+    What it sheds on the ground has the color of a clear sky, 15,000 K, and a quarter of the sun's strength.
     """
     world = bpy.data.worlds.new(name)
     graph = Graph(shader_tree(world))

@@ -179,8 +179,7 @@ def _set_at_once(objects: Sequence[bpy.types.Object], rows: Sequence[np.ndarray]
 def _numbered(names: Sequence[str], kinds: np.ndarray) -> list[str]:
     """Name of each new plant, by its kind.
 
-    Blender finds numbers for equal names by itself, and is slow at it: 30,000 plants of one name take twice as long as
-    with numbers beyond all that are there.
+    Blender finds numbers for equal names by itself, and is slow at it: 30,000 plants of one name take twice as long.
     """
     if len(kinds) < _FEW:
         return [names[kind] for kind in kinds.tolist()]

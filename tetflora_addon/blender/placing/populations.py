@@ -96,8 +96,7 @@ def own_number(objects: Iterable[bpy.types.Object]) -> int:
 def make_plants_steps(data: JobData, population: TetFloraLayer, later: Collection[str] = ()) -> Job[PlacedPlants]:
     """Place a population's plants by its settings, in place of those that it has.
 
-    Closing the steps, or an error, leaves the scene as it was. Plants of populations that are planted later, of which
-    the identities are given, keep nobody away.
+    Closing it, or an error, changes nothing. Plants of populations that are planted later keep nobody away.
 
     Raises
     ------

@@ -321,7 +321,9 @@ def year_now(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> float:
 
 
 def stand_years(scene: bpy.types.Scene) -> list[float]:
-    """Present years of all histories of a scene."""
+    """Present years of all histories of a scene; at little cost where the file has none, whatever objects there are."""
+    if not any(YEAR in data.attributes for data in (*bpy.data.meshes, *bpy.data.pointclouds)):
+        return []
     meshes = (obj for obj in scene.objects if isinstance(obj.data, Points))
     return [group.stand_year for obj in meshes if (group := obj.tetflora).is_field and has_history(obj)]
 

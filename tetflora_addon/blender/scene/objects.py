@@ -2,11 +2,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Objects of a scene that take part in refinement, by view layer; instances of plants; triangles of occluders.
 
-Blender lists instances one by one (``Depsgraph.object_instances``). Here each object that is instanced is visited once,
-and all of its places are computed at once as arrays, so that a million instances take little time.
+Blender lists instances one by one. Here each object that is instanced is visited once, its places as arrays.
 
-Instances of some objects are refined as assets: of those that are marked, and of dropped collections that are species.
-The mark is a property of the object. Objects that are linked cannot keep one, so the scene has a list of those.
+Instances of marked objects and of dropped species are refined as assets. The scene lists those marked that are linked.
 """
 
 from collections.abc import Callable, Collection, Iterator, Sequence
