@@ -310,7 +310,8 @@ def _dissolve(scene: bpy.types.Scene, collection: bpy.types.Collection | None) -
 
 
 def free_name(group: Iterable[bpy.types.PropertyGroup], name: str) -> str:
-    """A name, with a number as Blender's where another of the group has it."""
-    taken = {one.name for one in group if one.name}
-    numbered = (f"{name}.{i:03d}" for i in range(1, len(taken) + 2))
+    """A name, with a number as Blender's where another of the group has it, in place of the number that it has."""
+    taken, (stem, dot, end) = {one.name for one in group if one.name}, name.rpartition(".")
+    stem = stem if dot and end.isdecimal() else name
+    numbered = (f"{stem}.{i:03d}" for i in range(1, len(taken) + 2))
     return name if name not in taken else next(n for n in numbered if n not in taken)
