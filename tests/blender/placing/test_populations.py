@@ -393,7 +393,7 @@ def test_of_several_layers_it_is_said_which_have_no_room(monkeypatch: pytest.Mon
 
 @pytest.mark.parametrize(
     ("name", "free"),
-    [("Scatter", "Scatter.002"), ("Scatter.001", "Scatter.002"), ("No. 1", "No. 1"), ("v.x", "v.x.001")],
+    [("Scatter", "Scatter.002"), ("Scatter.001", "Scatter.002"), ("No. 1", "No. 1"), ("a.x", "a.x.001")],
 )
 def test_a_copy_of_a_copy_has_one_number(name, free):
     for taken in ("Scatter", "Scatter.001", "a.x"):
