@@ -191,7 +191,8 @@ _camera_found = base.need(
 
 
 class TETFLORA_OT_preview_levels(base.ModalJob, Operator, label="Compute Levels", needs=(_camera_found,)):
-    """Refine for the scene camera, or the frozen one, without creating meshes, and keep every level for viewports.
+    """Refine for the scene camera, or the frozen one, without creating meshes, and keep every level to step through in
+    viewports.
 
     Takes as long as the first part of Refine; Esc cancels and keeps the previous levels.
     """

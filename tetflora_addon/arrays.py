@@ -157,7 +157,7 @@ def gathered(array: NDArray, index: NDArray | slice) -> NDArray:
     index = np.flatnonzero(index) if index.dtype == bool else index
     if array.ndim <= 2:  # most are, and the order of a matrix's axes takes as long as its numbers
         return array.T.take(index, axis=-1).T
-    # As it lies in memory: numpy would copy all of it first. np.moveaxis and np.stack take as long as much arithmetic.
+    # As it lies in memory, or numpy would copy it first; np.moveaxis and np.stack cost as much as a thousand numbers.
     order = sorted(range(1, array.ndim), key=array.strides.__getitem__, reverse=True)
     picked = array.transpose(*order, 0).take(index, axis=-1)
     return picked.transpose(-1, *(order.index(axis) for axis in range(1, array.ndim)))

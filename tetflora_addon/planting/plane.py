@@ -23,7 +23,7 @@ _ENTRIES = 3_000_000  # about as many pieces of lines are noted in the cells
 def inside_any(points: Floats, polygons: Sequence[Floats]) -> Mask:
     """Which points (n, 2) lie in at least one polygon, (n,).
 
-    Polygons (k, 2) are closed. Of one that crosses itself, what is wound twice is outside.
+    Polygons (k, 2) go on from the last corner to the first. Of one that crosses itself, what is wound twice is outside.
     """
     inside = np.zeros(len(points), bool)
     for polygon in polygons:

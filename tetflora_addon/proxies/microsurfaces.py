@@ -167,7 +167,7 @@ def facet_sites(
 ) -> FacetSites:
     """Facets that areas (n,) are cut into, by the area (n,) of one; their expected number is area / facet.
 
-    From 1 on they divide the area evenly; below, one stands for several sub-plants. What is real (n,) has none.
+    From 1 on they divide the area evenly; below, one stands for several sub-plants. The real fraction (n,) has none.
     """
     expected = area / np.maximum(facet, 1e-300)  # leafless plants have no size of leaves
     counts = np.floor(expected + uniform(key, draw)).astype(np.int64)

@@ -165,7 +165,7 @@ def divide_in_eight(vertices: Floats, diagonal: Integers | None = None) -> tuple
 def divide_by_shape(vertices: Floats) -> tuple[Floats, Floats]:
     """Divide tetrahedra ``(n, 4, 3)`` into eight in the way that keeps them in better shape, so that no slivers arise.
 
-    Both ways give eight of equal volume, three planes deep. Worst qualities count, `HANDICAP` on bisection.
+    Both ways give eight of equal volume, three planes deep. Worst qualities count, bisection with a `HANDICAP`.
 
     Parameters
     ----------

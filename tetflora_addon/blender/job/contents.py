@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Input of refinement from a scene: plants, meshes, lights, compiled species and assets, and settings.
 
-Meshes of assets are read here, one asset at a time; the engine compiles each in its thread, and finds it by a digest.
+Meshes of assets are read here, one asset at a time; the engine compiles each in its thread, and keeps it by a digest.
 """
 
 from collections.abc import Generator, Mapping, Sequence

@@ -44,7 +44,7 @@ def read_explicit(depsgraph: bpy.types.Depsgraph) -> Explicit | None:
     Raises
     ------
     SceneError
-        A marked object without faces, with numbers that are none, or linked and not to be hidden; named.
+        A marked object without faces, with invalid numbers, or linked and not to be hidden; the message names it.
     """
     if not any(o.tetflora.is_explicit for o in bpy.data.objects):
         return None

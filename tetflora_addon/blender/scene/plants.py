@@ -77,7 +77,7 @@ def read_plants(
     NoPlantsError
         No plant is left; the message says how to get some.
     SceneError
-        No plant is of a known species, or one has a scale of 0 or a transform that is no number; named.
+        No plant is of a known species, or one has a scale of 0 or an invalid transform; the message names them.
     """
     read = partial(_read_plants, scene, depsgraph)
     movers = scene.render.use_motion_blur and [o for o in bpy.data.objects if may_take_part(o) and moves(o)]
