@@ -1,8 +1,6 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Tools that point at the ground: what they share (pointing, undo, leaving), placing plants by clicking, and a brush
-that paints, erases and thins plants.
-"""
+"""Tools that point at the ground: what they share, placing plants by clicking, and a brush that paints and thins."""
 
 import time
 from math import radians, tau

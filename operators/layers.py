@@ -137,7 +137,8 @@ class TETFLORA_OT_update_layers(_InParts, Operator, label="Update", needs=_ACTIV
         uids = [layer.uid for layer in (*layers.children_of(active), active) if layer.kind != BIOME] if one else []
         uids = uids if one else layers.due_layers(scene)
         if not uids:
-            raise SceneError("All layers are up to date")
+            more = "If a ground has changed, choose Update This Layer in the menu beside the list"
+            raise SceneError(f"No setting has changed since the layers were grown. {more}")
         return (yield from self._each(scene, depsgraph, uids))
 
     def _each(self, scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, uids: list[str]) -> Job[Updated]:

@@ -119,8 +119,7 @@ def _unseen(scene: bpy.types.Scene, statistics: Statistics) -> str:
     )
 
 
-# Meshes stay hidden where results were deleted by hand. Only then are all objects looked through: a panel asks at every
-# movement of the mouse.
+# Meshes stay hidden where results were deleted by hand. Only then are all objects looked through: panels ask often.
 _clearable = base.need(
     lambda context: (
         has_results(context.scene) or (context.scene.tetflora.statistics and hiding.hidden_originals(context.scene))

@@ -2,8 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Pages of the manual: a button in the header of each panel, and Online Manual in the menu of a right click.
 
-Pages are those of the website in the manifest. While that is a placeholder, they are the copies in the extension's
-folder, which have no pictures.
+Pages are those of the website in the manifest; while that is a placeholder, copies in the extension, without pictures.
 """
 
 import tomllib

@@ -36,9 +36,9 @@ class TETFLORA_UL_layers(bpy.types.UIList):
             row.separator()
         named = item.field if item.kind == FIELD and item.field is not None else item
         handle = row.row()
-        handle.scale_x = 0.6
-        base.Button("move_layer", 'GRIP', "", {"direction": 'DRAG', "layer": item.uid}).draw(handle, emboss=False)
-        row.prop(named, "name", text="", emboss=False, icon=kind)
+        handle.scale_x, icon = (0.5, 'GRIP') if kind == GROUP else (1.0, kind)  # what it is, and where it is dragged
+        base.Button("move_layer", icon, "", {"direction": 'DRAG', "layer": item.uid}).draw(handle, emboss=False)
+        row.prop(named, "name", text="", emboss=False)
         right = row.row(align=True)
         right.alignment = 'RIGHT'
         due = is_due(item)  # then the number is about to change, and names need the room
@@ -55,10 +55,10 @@ class TETFLORA_UL_layers(bpy.types.UIList):
 
 
 def _short(number: int) -> str:
-    """A number in few letters, beside names: ``960``, ``82 k``, ``1.2 M``."""
-    if number < 10_000:
-        return f"{number:,}"
-    return f"{number / 1e3:.0f} k" if number < 1e6 else f"{number / 1e6:.1f} M"
+    """A number in few letters, beside names: ``960``, ``1.2k``, ``82k``, ``1.2M``."""
+    if number < 1000:
+        return f"{number}"
+    return f"{number / 1e3:.{int(number < 9950)}f}k" if number < 999_500 else f"{number / 1e6:.1f}M"
 
 
 @base.menu("TetFlora Biome")

@@ -3,12 +3,10 @@
 """Structures of arrays: many things of one kind, with one array for each of their properties.
 
 Vectors are (n, 3) and frames (n, 3, 3), but memory holds one component of all n after the other. Arithmetic on such
-arrays runs along n without strides, and its results keep the layout. Only indexing and stacking have to take care of
-it; the functions below do.
+arrays runs along n without strides, and its results keep the layout. Indexing and stacking do by the functions below.
 
 Where things come and go in small steps, what that costs goes with what changes, not with what is there: `Growing` has
-room to spare and is changed in place, for few columns that are looked at all the time. `Chunks` only collects, for many
-columns that nobody looks at before all is done.
+room to spare and is changed in place, for few columns. `Chunks` only collects, for many.
 """
 
 from collections.abc import Iterator, Sequence
@@ -81,8 +79,7 @@ def smoothstep(x: Floats, low: float = 0.0, high: float = 1.0) -> Floats:
 class Arrays:
     """Base of dataclasses whose fields are columns: one row for each of n things.
 
-    A column is an array, or another `Arrays` of the same length. One whose default is None may be absent. All other
-    fields belong to the whole and are kept as they are.
+    A column is an array, or an `Arrays` of that length. One whose default is None may be absent. Others stay.
     """
 
     def __getstate__(self) -> dict[str, Any]:
@@ -160,8 +157,7 @@ def gathered(array: NDArray, index: NDArray | slice) -> NDArray:
     index = np.flatnonzero(index) if index.dtype == bool else index
     if array.ndim <= 2:  # most are, and the order of a matrix's axes takes as long as its numbers
         return array.T.take(index, axis=-1).T
-    # As it lies in memory: numpy would copy all of it first. Neither here nor below np.moveaxis or np.stack, which take
-    # as long as arithmetic on a thousand numbers.
+    # As it lies in memory, or numpy would copy it first; np.moveaxis and np.stack cost as much as a thousand numbers.
     order = sorted(range(1, array.ndim), key=array.strides.__getitem__, reverse=True)
     picked = array.transpose(*order, 0).take(index, axis=-1)
     return picked.transpose(-1, *(order.index(axis) for axis in range(1, array.ndim)))
@@ -406,8 +402,7 @@ class Chunks(Generic[Rows]):
 def quaternions(frame: Floats) -> Floats:
     """Unit quaternions, (n, 4) with w first, of rotations, (n, 3, 3).
 
-    Each of the four ways to write it down is exact where its own component is large; the one with the largest is taken
-    (Shepperd, Journal of Guidance and Control, 1978).
+    Of four ways to write it, that of the largest component is exact (Shepperd, Journal of Guidance and Control, 1978).
     """
     r = frame
     trace = np.trace(r, axis1=1, axis2=2)

@@ -2,8 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Errors that a user can cause; their message names the thing and says what to do next.
 
-What they name comes from files of anybody, so that texts are made `readable`, and values `quoted`, before they are
-told.
+What they name comes from files of anybody: texts are made `readable`, and values `quoted`, before they are told.
 """
 
 import re

@@ -96,8 +96,7 @@ def read_whole(path: Path, most: int) -> bytes:
 def write_whole(path: Path, content: bytes | str) -> None:
     """Write a file beside its place and then put it there; text becomes UTF-8.
 
-    Readers in other processes see the old file or the new one, never a part of either. A link is replaced, and what it
-    leads to stays as it is.
+    Readers in other processes see the old file or the new one, never a part. A link is replaced, not what it leads to.
 
     Raises
     ------

@@ -2,8 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Work in blocks on several cores: numpy lets go of the interpreter's lock while it computes, so threads suffice.
 
-What a block gives must not depend on other blocks, and blocks must not depend on the number of cores: then neither do
-results, to the bit.
+No block may depend on another, and none on the number of cores: then neither do results, to the bit.
 """
 
 import os

@@ -184,11 +184,9 @@ def write_arrays(path: Path, names: re.Pattern[str], most: int, **arrays: NDArra
 
 
 def make_room(folder: Path | None, names: re.Pattern[str], most: int) -> None:
-    """Delete this user's files of some names in a folder that were not used for longest, as long as all of them are
-    larger than ``most`` bytes, and those that nobody will end.
+    """Delete this user's files of some names in a folder, longest unused first, down to ``most`` bytes; and left-overs.
 
-    Any of them may be gone already: other processes tidy up as well. What others own counts for them alone, or whoever
-    fills the folder would empty the rest of it.
+    Any of them may be gone already: other processes tidy up as well. What others own counts for them alone.
     """
     now, files = time.time(), []
     for entry in islice(_entries(re.compile(f"{names.pattern}|{_BEGUN.pattern}"), folder), _MOST_ENTRIES):

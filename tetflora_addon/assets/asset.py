@@ -99,8 +99,7 @@ class SurfaceSamples(Arrays):
 class AssetKites(Arrays):
     """Leaves (l) as kites of the same area, in the space of their asset.
 
-    A kite lies in the plane of one of the leaf's faces, chosen in proportion to their areas: on average it shows the
-    same area from everywhere.
+    A kite lies in the plane of a face of the leaf, chosen by area: on average it shows the same area from everywhere.
     """
 
     center: Floats32 = column(3, dtype=np.float32)  # (l, 3): meters

@@ -5,8 +5,7 @@
 Clusters are made of whole patches, so that no leaf is in two of them. Blender calls connected faces an island.
 
 Clusters are a hierarchy, as a species has orders of branches. Patches are divided in space, each time in two where a
-cluster is longest and half of the triangles are on either side (a k-d tree; Bentley 1975). Three divisions at once make
-eight children.
+cluster is longest and half of the triangles are on either side (a k-d tree; Bentley 1975); three at once, into eight.
 
 What the faces of any mesh are part of: sheets such as leaves, or solids such as trunks, and how wide these are.
 

@@ -5,7 +5,7 @@
 from . import main_thread, preferences, properties, runtime, saved_files, translations, worker
 from .biomes import layers, library
 from .cli import command
-from .job import forecast, render
+from .job import forecast, render, stored_contents
 from .placing import assets
 from .runtime import in_order
 from .species import catalog, edits
@@ -23,6 +23,7 @@ register, unregister = in_order(
     properties,
     render,
     forecast,
+    stored_contents,
     saved_files,
     edits,
     auto,

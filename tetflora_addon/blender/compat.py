@@ -39,8 +39,7 @@ def stored_properties(owner: bpy.types.ID) -> Any | None:
 def shader_tree(owner: bpy.types.Material | bpy.types.World | bpy.types.Light) -> bpy.types.NodeTree:
     """Node tree of a material, world or light, made if there is none.
 
-    From 5.0 on new datablocks have one from the start, and touching ``use_nodes`` warns of its removal; 4.5 makes the
-    tree when ``use_nodes`` is set.
+    From 5.0 on new datablocks have one, and touching ``use_nodes`` warns of its removal; 4.5 makes it when that is set.
     """
     if owner.node_tree is None:
         owner.use_nodes = True
@@ -70,8 +69,7 @@ def disable_bump_correction(material: bpy.types.Material) -> None:
 def loses_summed_lobes() -> bool:
     """Whether Cycles loses light where lobes around several normals are added.
 
-    It counts the probability of those that it has cut off at the face's horizon, but not their light (issue 139870 of
-    Blender); mended in 5.0, which also brought this node.
+    It counts those cut off at the face's horizon, but not their light (issue 139870); mended in 5.0, with this node.
     """
     return not hasattr(bpy.types, "ShaderNodeRadialTiling")
 
@@ -114,6 +112,11 @@ def set_node_input(modifier: bpy.types.NodesModifier, identifier: str, value: ob
         getattr(modifier.properties.inputs, identifier).value = value
     else:
         modifier[identifier] = value
+
+
+def stored_inputs(modifier: bpy.types.Modifier) -> list[tuple[str, object]]:
+    """Inputs of a modifier's geometry nodes where they are custom properties, before 5.2; later they are settings."""
+    return [] if modifier.type != 'NODES' or hasattr(modifier, "properties") else list(modifier.items())
 
 
 def usd() -> SimpleNamespace | None:

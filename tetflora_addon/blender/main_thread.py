@@ -3,16 +3,14 @@
 """Changes of a scene's contents that must not happen while the window is drawn.
 
 Blender calls the handlers of a render that the window shows in the thread of the render. *Lock Interface* keeps 3D
-views and properties from drawing meanwhile, but not the Outliner (source of 5.2: its region has no lock). That looks
-up every object of every collection in the view layer, and Blender crashes if the other thread is just linking or
-removing one, or is at the view layer's list of objects, which it makes anew after each change when somebody needs it.
-So such changes are handed to the main thread, which makes them between two redraws, and the lists at once.
+views and properties from drawing meanwhile, but not the Outliner (source of 5.2: its region has no lock). That looks up
+every object of the view layer, and Blender crashes if the other thread is just linking or removing one, or is at the
+list of these. So the main thread makes such changes between two redraws, and the lists at once.
 
 Without *Lock Interface* nothing keeps the window from drawing what the other thread changes. Then all that a handler
 does is handed over, and the window stands still meanwhile: `window_draws` tells.
 
-Blender's timers are a list without a lock, so only the main thread may touch them: one timer, which is there as long
-as the extension is, looks at a queue.
+Blender's timers are a list without a lock, so only the main thread may touch them: one timer looks at a queue.
 """
 
 import threading

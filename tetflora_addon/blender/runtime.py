@@ -127,8 +127,7 @@ _Result = TypeVar("_Result")
 class Outlook(Generic[_Result]):
     """What panels say of a scene, found a moment after a change, and the less often the longer that takes.
 
-    Of the last two times the shorter counts: what is prepared at first, or after a change, is there the next time. So
-    nothing computes while it is drawn. In the background, where no timer runs, it is found when it is asked for.
+    Of the last two times the shorter counts: at first some is prepared. In the background it is found when asked for.
 
     Parameters
     ----------
@@ -354,8 +353,7 @@ def guarded(data: JobData, steps: Generator[Any, Any, _Result]) -> Generator[Any
 def job(title: str) -> Callable[[Callable[..., Generator]], Callable[..., Generator]]:
     """Make a job of a generator function: callers give the scene, the dependency graph and what else there is.
 
-    It gets `JobData` in place of the first two, and is `guarded`. Closing the steps, or an error, has to leave
-    everything as it was.
+    It gets `JobData` in place of the first two, and is `guarded`. Closing it, or an error, must leave all as it was.
     """
 
     def decorated(steps: Callable[..., Generator]) -> Callable[..., Generator]:
@@ -427,6 +425,16 @@ def complain(text: str) -> None:
             menu.layout.label(text=line)
 
     _in_window(lambda: bpy.context.window_manager.popup_menu(draw, title="TetFlora", icon='ERROR'))
+
+
+def show_status(text: str | None = None) -> None:
+    """Show a text in status bars, and its beginning above pictures that are rendered, or again what is usual there."""
+    for window in bpy.context.window_manager.windows:
+        with bpy.context.temp_override(window=window):
+            window.workspace.status_text_set(text)
+        for area in window.screen.areas:
+            if area.type == 'IMAGE_EDITOR' and getattr(area.spaces.active.image, "type", "") == 'RENDER_RESULT':
+                area.header_text_set(text and text.partition("   |")[0])
 
 
 def open_menu(identifier: str) -> None:

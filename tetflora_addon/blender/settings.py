@@ -186,8 +186,7 @@ _OPEN = {"proxy_kind"}
 def check_limits(group: bpy.types.PropertyGroup, owner: str) -> None:
     """Refuse numbers and choices that no slider and no menu gives.
 
-    Scripts that write custom properties, and files of any origin, can store them past Blender's own checks, and Blender
-    takes nan for any number.
+    Scripts that write custom properties, and files, can store them past Blender's checks, and Blender accepts nan.
 
     Parameters
     ----------
@@ -257,9 +256,8 @@ class RefinementProperties(settings_in(RefinementSettings)):
         get=quality_number,
         set=set_quality,
     )
-    # The paper's shading of shells (section 7), for scripts: the fraction of light that they scatter evenly (p), that
-    # which those of coplanar leaves reflect as a highlight (s), the exponent of that (spear), how round contents are
-    # shaded, and random variation of brightness.
+    # The paper's shading of shells (section 7), for scripts: the fraction of light scattered evenly (p), that of
+    # highlights of coplanar leaves (s), their exponent (spear), how round contents look, and random variation.
     shell_diffuse: real("Shell Diffuse", "", 1.0, **_SHELL)
     shell_gloss: real("Shell Gloss", "", 0.04, **_SHELL)
     shell_spear: real("Shell Spear", "", 7.5, **{**_SHELL, "max": 1000.0})

@@ -2,8 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The interface in other languages: a file in the folder ``locale`` for each, named by Blender's code of the language.
 
-A file maps English texts to translations, those of operators under "Operator" and all others under "*", Blender's
-contexts. What is missing stays English.
+A file maps English texts to translations, by Blender's contexts "Operator" and "*". What is missing stays English.
 """
 
 import json

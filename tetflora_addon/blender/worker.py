@@ -56,8 +56,7 @@ def in_thread(work: Generator[_Item, Any, _Result], ahead: int = 0) -> Generator
     Parameters
     ----------
     work : generator
-        Its items are not None. What is sent for an item, or what is true and sent while there is nothing yet, is sent
-        to it when it goes on.
+        Its items are not None. What is sent for an item, or is true and sent before there is one, is sent to it.
     ahead : int
         Items that it may make before they are asked for; with 0 it goes on when the next one is.
 

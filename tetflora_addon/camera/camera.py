@@ -404,8 +404,7 @@ def silhouette_area(local: Floats, low: Floats, high: Floats, camera: Camera) ->
     whole = ((low >= np.array([left, bottom]) - slack) & (high <= np.array([right, top]) + slack)).all(axis=1)
     depth = local[..., 2]
     whole &= (depth.max(axis=1) <= far * (1.0 + 1e-9)) & (low <= high).all(axis=1)
-    # Each ray crosses the surface twice. Signed areas of a closed surface add up to nothing, which gives the section
-    # at the near plane from the four faces.
+    # Each ray crosses the surface twice. Signed areas of a closed surface add up to 0: the four faces give the section.
     area, ahead = np.zeros((len(local), 4)), depth >= near
     flat = _project(local, camera)
     for face, (i, j, k) in enumerate(FACES):
@@ -439,8 +438,7 @@ def _clipped_area(triangles: Floats, camera: Camera) -> Floats:
 def window_bounds(local: Floats, camera: Camera) -> tuple[Floats, Floats, Floats]:
     """Boxes ``low``, ``high`` (n, 2) on the window, and a point (n, 2) on it that lies within the silhouette.
 
-    The part before the near plane is cut off; boxes of what lies wholly before it or wholly beyond the far plane are
-    empty: ``low > high``.
+    What is before the near plane is cut off; boxes of what is wholly before it or too far are empty: ``low > high``.
     """
     count = local.shape[1]
     near, far = camera.near, camera.far

@@ -273,8 +273,7 @@ def side_branches(
 ) -> tuple[Floats, Floats, Floats]:
     """Laterals or dead branches (k,) of a row: vigors, what radii are in proportion to, and lengths × radii.
 
-    All relative to their parent's. They are at fractions t (k,) of it and (k,) of its children; laterals are shorter by
-    factors ``fading`` (k,).
+    Relative to their parent's, at fractions t (k,) of it and of its children; laterals are shorter by ``fading`` (k,).
     """
     row, here = rows[i], np.full(t.shape, i)
     child = rows[row["next"][sort]]

@@ -3,8 +3,7 @@
 """Bounding volumes of sub-plants of every order, from the ranges alone (paper, section 5).
 
 Computed from the highest order down to the trunk: the longest possible branch at every angle that it may take. The
-volume is a cylinder about the branch's axis for a branch of unit length; what does not scale with the length (leaves,
-thickness) is a pad.
+volume is a cylinder about the axis of a branch of length 1; what does not scale with it (leaves, thickness) is a pad.
 """
 
 from collections.abc import Sequence
@@ -108,14 +107,12 @@ def unit_bounds(rows: Table, raised: bool = False) -> Floats:
     ----------
     rows : (r,) table of `rows.build_rows`
     raised : bool
-        Also if plants have crown bases (see `growth.crown_effects`), so that any limb may be anywhere above where they
-        begin.
+        Also with crown bases (see `growth.crown_effects`), so that any limb may be anywhere above where they begin.
 
     Returns
     -------
     (r, 3) float64
-        Radius, lowest and highest z, in the frame of the branch's base; z is at most 0 at the bottom and at least 0 on
-        top.
+        Radius, lowest and highest z, in the frame of the base; z is at most 0 at the bottom and at least 0 on top.
     """
     bounds = np.zeros((len(rows), 3))
     for index in range(len(rows) - 1, -1, -1):
@@ -225,8 +222,7 @@ def _crown_most(row: Table, low: Floats, high: Floats) -> Floats:
 def sampled_bounds(parts: Sequence[Points], rows: int) -> Floats:
     """Cylinders (r, 6) that hold the samples of each row.
 
-    Radius across the branch, and lowest and highest place along it. Then how far across the limbs leave that they are
-    on, and how far along it, down and up, they are from there.
+    Radius across the branch, and lowest and highest place along it; then the same of its limbs from where they are.
     """
     out = np.zeros((rows, 6))
     for points in parts:

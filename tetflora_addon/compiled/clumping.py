@@ -382,8 +382,7 @@ def fit_clumping(
     area : (r, r) float64
         Expected optical area of a sub-plant by the row that contributes it.
     polygons, width, length : (r,) float64
-        Expected faces of a sub-plant, width of its leaves (0 without) and length of its branch, meters at plant
-        scale 1.
+        Expected faces of a sub-plant, width of its leaves (or 0) and length of its branch, meters at plant scale 1.
     """
     root, density, own = np.zeros((3, len(rows)))
     usual = np.where(length > 0, length, 1.0)

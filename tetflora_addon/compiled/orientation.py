@@ -329,8 +329,7 @@ _PLANES = 32
 def face_planes(rows: Table, forms: Sequence[Sequence[Sequence[LeafModel]]]) -> Floats:
     """Rotations (r, `_PLANES`, 3, 3) from axes of a face to those of the leaf that each row's own branch bears.
 
-    The third axis is the normal of the face, the second as near as may be to the leaf's midrib. Each stands for the
-    same area.
+    The third axis is the normal of the face, the second as near as can be to the midrib. Each stands for the same area.
     """
     own = np.stack([rows["species"], rows["leaf_kind"]], axis=1)
     kinds, kind = np.unique(own, axis=0, return_inverse=True)

@@ -6,13 +6,11 @@ A plant that stands still is of the class of heights that is nearest: each is 1.
 makes up for what is left. Classes belong to the species alone, so that no plant depends on others.
 
 A plant whose crown is narrow for its height and begins far up grew between neighbors: it is of a dense stand's *habit*,
-with a slim trunk and short limbs, where a free one with its limbs cut short and thinned out would be bare. Taller ones
-than full-grown are old only if they are as thick.
+with a slim trunk and short limbs. Taller ones than full-grown are old only if they are as thick.
 
 Where a stand grows in an animation, plants must not jump from class to class. There, plants that are born, die and end
 up alike are a *cohort*: one kind, whose age goes on as those of its plants do on the mean; scales make up for the
-difference in height. What a plant belongs to follows from its whole life and not from the present year, so that a frame
-alone is that of the film.
+difference in height. What a plant belongs to follows from its whole life, so that a frame alone is that of the film.
 """
 
 from collections.abc import Callable

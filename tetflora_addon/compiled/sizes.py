@@ -3,8 +3,7 @@
 """Heights and crown widths of single plants as one would measure them, and crown shapes of plants that were measured.
 
 Of the limbs of a plant the few that are likely to end outermost or on top are grown. How far what grows on these
-reaches beyond them is known from a few whole limbs of their kind. How wide and how tall plants of a species are on
-average is for distances to plant at, and for estimates.
+reaches beyond them is known from a few whole limbs of their kind. Means of a species are for distances and estimates.
 """
 
 from collections.abc import Callable
@@ -265,8 +264,7 @@ def fitted(flora: Flora, seeds: Seeds, height: Floats, width: Floats, times: int
     Returns
     -------
     (n, 2) float64
-        Factors on the scale, and on the lengths of limbs (the first column of crown shapes), which stay within their
-        limits; heights are met even then.
+        Factors on the scale, and on lengths of limbs (first column of crown shapes), within limits; heights are met.
     """
     out = np.ones((len(seeds), 2))
 

@@ -7,8 +7,7 @@ What is drawn is opaque, so that a depth for each pixel says the same as the alp
 rectangle of pixels that they touch lies before them, as by Greene, Kass and Miller ("Hierarchical Z-buffer visibility",
 SIGGRAPH 1993), but from maxima of overlapping squares.
 
-What lies deep in the shade owes the image nothing but to keep light out. Optical depths add up along the light as they
-do along a view (paper, section 6.3).
+What lies deep in the shade owes the image nothing but to keep light out. Depths add up as along a view (paper, 6.3).
 """
 
 from collections.abc import Sequence

@@ -348,8 +348,7 @@ class _Tile(Canvas):
     def _leave_out(self, number: float) -> None:
         """Leave out so many things, should there be more than allowed.
 
-        First go facets that nobody sees, then the smallest faces in the image, at last facets that are seen; of facets
-        all alike by a hash.
+        First go facets that nobody sees, then the smallest faces in the image, at last seen facets, all by a hash.
         """
         if number <= 0.0:
             return
@@ -417,8 +416,7 @@ class _Tile(Canvas):
     def _merge(self, facets: Facets, number: Floats, whose: Whose) -> None:
         """Few large facets for many that are hidden, by a random number (n,) of each.
 
-        Each lies behind full pixels as a whole. Those that can be large stand for all others in their cell of the
-        image, leaves for leaves and wood for wood.
+        Each lies behind full pixels as a whole. Large ones stand for others of their kind in their cell of the image.
         """
         prints, column, row, _ = self.coverage.of_corners(triangle_corners(facets))
         # A facet has another outline than the face for which it stands.

@@ -192,8 +192,7 @@ def polygon_buffers(polygons: Polygons) -> MeshBuffers:
     """Polygons of one surface as a mesh in world space.
 
     Whole faces share vertices and edges as in the surface, unless they have one twice; fragments are separate. Faces of
-    mirrored instances are turned around, as in Blender. Normals, where the surface has any, are the attribute
-    ``custom_normal``.
+    mirrored instances are turned around, as in Blender. Normals, if any, are ``custom_normal``.
     """
     meshes = polygons.meshes
     cut = polygons.part >= 0

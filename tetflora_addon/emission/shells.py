@@ -49,8 +49,7 @@ def shell_buffers(cells: MediumCells, rank: NDArray | None = None, light: Floats
     Returns
     -------
     MeshBuffers
-        Four triangles, four vertices and six edges a cell, facing outwards. Flat cells get no extinction, because
-        their thickness has no meaning.
+        Four triangles, four vertices and six edges a cell, facing outwards. Flat cells get no extinction.
     """
     order = np.arange(len(cells)) if rank is None else np.argsort(rank, kind='stable')[::-1]
     cells = cells.take(order)

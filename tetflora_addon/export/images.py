@@ -3,8 +3,7 @@
 """Textures of exported plants: atlases of leaves and wood in their colors, and PNG files.
 
 Formats have no node that would vary the color from leaf to leaf. So the colors of a species' leaves are clustered to a
-few, an atlas has a cell for each of them, and the texture coordinates of a leaf lie in the cell nearest to its own
-color.
+few, an atlas has a cell for each of them, and texture coordinates of a leaf lie in the cell nearest to its color.
 
 Source of the file format: W3C, "Portable Network Graphics (PNG) Specification (Third Edition)".
 """

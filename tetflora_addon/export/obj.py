@@ -2,8 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Variants as Wavefront OBJ, an object for each level, with their materials; and a table of all places beside it.
 
-For programs that have no instances in their files, and for pictures of single plants. Sizes on the screen at which
-levels take over are comments.
+For programs without instances in files, and pictures of single plants. Sizes at which levels take over are comments.
 """
 
 from collections.abc import Iterator

@@ -65,9 +65,7 @@ def choose_variants(flora: Flora, seeds: Seeds, most: int) -> Variants:
 
 
 def _features(flora: Flora, seeds: Seeds, own: Integers) -> tuple[Floats, Floats]:
-    """Lengths (m,) of the trunks of some plants (m,), which heights follow, and what they differ in (m, f), each with
-    the same spread but for the size.
-    """
+    """Lengths (m,) of trunks of some plants (m,), and what else they differ in (m, f), each with the same spread."""
     length, rows = np.zeros(len(own)), []
     for begin in range(0, len(own), _CHUNK):
         some = seeds.take(own[begin : begin + _CHUNK])

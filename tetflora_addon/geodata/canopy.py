@@ -1,7 +1,6 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Trees from a canopy height model: tops are highest within a window as wide as a crown of their height; crowns are
-what rises toward a top.
+"""Trees from a canopy height model: tops are highest in a window as wide as their crown; crowns rise toward a top.
 
 Windows follow S. C. Popescu and R. H. Wynne, "Seeing the Trees in the Forest", Photogrammetric Engineering & Remote
 Sensing 70 (5), 2004: crown width over height of mixed stands. Crowns are watersheds: from each cell one climbs to its

@@ -1,8 +1,6 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Grids of heights of other kinds: tiles of the Shuttle mission, lists of places, elevation models of the USGS; and
-several tiles as one.
-"""
+"""Grids of heights of other kinds: tiles of the Shuttle mission, lists of places, models of the USGS; tiles as one."""
 
 import re
 from collections.abc import Sequence

@@ -58,8 +58,7 @@ def are_solids(rows: Table) -> Mask:
 def axis_places(rows: Table, branches: Branches, row: Integers, owner: NDArray, t: Floats) -> Floats:
     """Fractions (m,) of axes at the height of leaves at places t (m,) of branches, of rows (m,) or (1,).
 
-    The inverses of the fractions of the solids below a height u, from 0 to 1: u²(3 − 2u) of a sphere, 1 − (1 − u)³ of a
-    cone.
+    Inverses of the fractions of solids below a height u, from 0 to 1: u²(3 − 2u) of a sphere, 1 − (1 − u)³ of a cone.
     """
     shape = rows["envelope"][row]
     if not shape.any():

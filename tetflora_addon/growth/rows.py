@@ -137,8 +137,7 @@ def spread_children(
 ) -> tuple[Floats, ...]:
     """Children of one sort of a mean branch of a row that is not full-grown, as many as stand for all.
 
-    ``bare`` and ``dead`` are as in `living`; ``among`` (2,) is where the row's children begin and end among those of
-    the order's branch, by a crown shape.
+    ``bare`` and ``dead`` are as in `living`; ``among`` (2,) is where its children begin and end, by a crown shape.
 
     Returns
     -------

@@ -109,9 +109,8 @@ YEAR_COLUMN = [
     *((name, np.float64) for name in ("day", "middle", "spring", "autumn")),
 ]
 """``year`` are the days of the leaves that the row bears, counted from ``origin``, half a year before the middle of
-their life, and of the fall those after the change of color; ``follows`` whether there are any; ``day`` is the scene's
-day, ``middle`` that in the middle of the life of the species' leaves, ``spring`` and ``autumn`` are days by which its
-plants differ."""
+their life, and of the fall those after the change of color; ``follows`` whether there are any; ``day`` is the scene's,
+``middle`` that in the middle of the leaves' life, ``spring`` and ``autumn`` days by which plants differ."""
 
 
 def seasonal_rows(rows: Table, species: Sequence[Species], season: Season) -> Table:

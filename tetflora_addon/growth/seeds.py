@@ -3,8 +3,7 @@
 """Seeds: all that is stored of a plant before it is needed (paper, section 5).
 
 Beside it some have a crown shape, six numbers by which one plant differs from others of its kind because of how it
-grew: a tree of a stand has a narrow crown far up, which leans to where the light is; one that is recorded in an
-inventory has the crown that was measured.
+grew: a tree of a stand has a narrow crown far up, which leans to the light; one of an inventory has the crown measured.
 
 Of what has begun to grow from them there are `Branches`.
 """

@@ -9,8 +9,7 @@ at the twigs, as in "Physically Guided Animation of Trees" (Habel, Kusternig and
 move by themselves keep real trees from swaying like poles is shown in "Mechanical stability of trees under
 dynamic loads" (James, Haritos and Ades, 2006).
 
-Rows of a flora in the wind have the columns of `WIND_COLUMNS` besides; others have not, and nothing here costs them
-anything.
+Rows of a flora in the wind have the columns of `WIND_COLUMNS` besides; others have not, and pay nothing for them.
 """
 
 from dataclasses import dataclass
@@ -83,7 +82,7 @@ class Wind:
         "Speed",
         "Mean speed in meters per second: 2 stirs leaves, 4 is a gentle breeze, 10 sways trees, 20 is a gale. Animate "
         "it slowly: plants react at once",
-        **within(0.0, 25.0, 100.0),
+        **within(0.0, 25.0, 100.0) | {"unit": 'VELOCITY'},
     )
     #: Radians from +x toward +y.
     direction: float = setting(
@@ -168,8 +167,7 @@ def widest_sway(rows: Table) -> Floats:
 def sway(rows: Table, branches: Branches, ahead: float = 0.0) -> Floats:
     """Rotation vectors (n, 3), radians, of branches' tips against their bases.
 
-    For plants drawn by hand ``branches`` are the whole plants: where they stand, and which way is up; what comes out is
-    for each meter of height at scale 1.
+    For plants drawn by hand ``branches`` are whole plants, and what comes out is for each meter of height at scale 1.
 
     Parameters
     ----------

@@ -1,7 +1,6 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Levels of a leaf beside its model, which is that of its species: finer forms for those that are near, and one kite
-for those of a pixel or two.
+"""Levels of a leaf beside its model, that of its species: finer forms up close, and one kite for a pixel or two.
 
 Each finer level has the same area, and knows how far it is from the shape it stands for, in lengths of the leaf; it is
 drawn where the one before it would be off by more than a part of a pixel.
@@ -434,9 +433,7 @@ def _longer_axis(points: Floats, weight: Floats, normal: Floats) -> NDArray:
 
 
 def _sheet(points: Floats, area: Floats) -> tuple[Floats, float, float]:
-    """Triangles as a sheet that is folded along its longer axis: its normal (3,), the sine by which both halves rise,
-    and the mean square by which normals are off.
-    """
+    """Triangles as a sheet folded along its longer axis: normal (3,), sine of the fold, mean square of what is off."""
     vectors = np.cross(points[:, 1] - points[:, 0], points[:, 2] - points[:, 0]) / 2
     whole, mean = area.sum(), vectors.sum(axis=0)
     if np.linalg.norm(mean) < whole / 2:
@@ -452,9 +449,7 @@ def _sheet(points: Floats, area: Floats) -> tuple[Floats, float, float]:
 
 
 def _kite(model: LeafModel, area: float, normal: Floats, fan: tuple[Floats, Floats], fold: float = 0.0) -> Floats:
-    """Vertices (4, 3) of a kite with an area and a normal, along the model's longer axis across that; both halves rise
-    by a fold.
-    """
+    """Vertices (4, 3) of a kite with an area and a normal, along the model's longer axis across that; both rise."""
     points, weight = fan[0], fan[1] / fan[1].sum()
     middle = (weight[:, None] * points.mean(axis=1)).sum(axis=0)
     points = points - middle

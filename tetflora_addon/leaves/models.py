@@ -6,8 +6,7 @@ A leaf model lies with its base at the origin, its midrib along +y, one unit lon
 
 Closed parts of models, such as berries and fleshy leaves, are made round: faces are divided as by Loop ("Smooth
 subdivision surfaces based on triangles", 1987). Points of spines and leaves stay where they are, and each part keeps
-its area. What is open, such as stalks, stays as it is. Up close spines grow from areoles that are spread evenly over
-closed parts.
+its area. What is open, such as stalks, stays as it is. Up close spines grow from areoles, evenly over closed parts.
 """
 
 from dataclasses import dataclass, replace
@@ -167,8 +166,7 @@ def mean_silhouette(model: LeafModel) -> float:
     """Mean over directions of the area that a leaf of size 1 covers, seen from each, to a few percent.
 
     A quarter of the surface of what is convex (Cauchy, "Note sur divers théorèmes relatifs à la rectification des
-    courbes et à la quadrature des surfaces", 1841). Directions follow a spiral over half of a sphere, as both sides
-    show the same; faces are drawn as fans of triangles.
+    courbes et à la quadrature des surfaces", 1841). Directions follow a spiral over half of a sphere; faces are fans.
     """
     corners = fans(model)[1]
     number = np.arange(_DIRECTIONS)

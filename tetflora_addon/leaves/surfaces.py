@@ -4,8 +4,7 @@
 
 Needles on a shoot are brushes, flat sprays, bundles of two to five: fewer and broader ones from afar, then all of them,
 flat, and prisms with a bend up close. Blades are outlines within a tolerance, with columns of faces beside the midrib,
-and bent as the leaf is. Compound leaves are leaflets in pairs along a rachis, as of ash and fern, or around a point, as
-petals.
+and bent as the leaf is. Compound leaves are leaflets in pairs along a rachis (ash, fern) or around a point (petals).
 """
 
 from collections.abc import Sequence

@@ -55,8 +55,7 @@ class LightBuffer:
     occluders : (t, 3, 3) float64, optional
         Opaque triangles, meters.
     sheets : (m, 4, 3) float64, optional
-        Corners of opaque facets or leaves, which count by the fraction of each pixel that they cover. Their numbers
-        are n to n + m − 1, after the tetrahedra.
+        Corners of opaque facets or leaves, which count by what they cover of each pixel, numbered from n.
     """
 
     def __init__(
@@ -234,8 +233,7 @@ class LightBuffer:
     def _gathered(self, emitted: Floats) -> Floats:
         """Radiance (f, 3) in front of each fragment, by a prefix scan over (transmittance, radiance) of its pixel.
 
-        Two stretches in a row are one: T = T₁ T₂, L = L₁ T₂ + L₂. Doubling their length covers all in few rounds
-        (Hillis and Steele, "Data Parallel Algorithms", 1986).
+        Two stretches are one: T = T₁ T₂, L = L₁ T₂ + L₂ (Hillis and Steele, "Data Parallel Algorithms", 1986).
         """
         through = np.exp(-self._depth.astype(np.float64))
         light = (emitted * (1.0 - through)[:, None]).T.copy()

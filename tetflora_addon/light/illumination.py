@@ -124,8 +124,7 @@ class Illumination:
     def around(self, points: Floats, cells: Integers) -> Floats:
         """Light from all sides at points, as harmonics (m, 9, 3): sky, and what tetrahedra and polygons scatter.
 
-        Linear between the samples of a tetrahedron's key points (paper, section 7); elsewhere the sky's buffers are
-        looked up again. Parameters as for `direct`.
+        Linear between samples at key points (paper, section 7), else by the sky's buffers. See `direct`.
         """
         result = np.zeros((len(points), scattering.HARMONICS, 3))
         inside = np.flatnonzero(cells >= 0)
@@ -323,8 +322,7 @@ def shadow_steps(
     resolution : int
         Longer side of a lamp's buffer, pixels; see `light_resolution`. The sky's are `SKY_FRACTION` of it.
     sheets : SurfaceElements, optional
-        Facets and leaves as they are drawn. Clumps smaller than tetrahedra shadow themselves, which an even cloud does
-        not; a pixel should be about as large as a sheet.
+        Facets and leaves as they are drawn: clumps shadow themselves, as no even cloud does. A pixel is about a sheet.
     near : Near, optional
         Part of the scene that gets buffers of its own from suns.
     orders : int
@@ -437,8 +435,7 @@ def baked_attributes(
 ) -> Mapping[str, tuple[str, Floats32]]:
     """Attributes of baked light on a domain 'FACE' or 'POINT', in the layout of `buffers.MeshBuffers`.
 
-    ``front`` (n, 3) is the linear radiance of the side to which normals point, ``back`` that of the other; by default
-    both are the same.
+    ``front`` (n, 3) is the linear radiance of the side to which normals point, ``back`` that of the other, or the same.
     """
     back = front if back is None else back
     return {FRONT: (domain, front.astype(np.float32)), BACK: (domain, back.astype(np.float32))}

@@ -3,8 +3,7 @@
 """What receives and blocks light: tetrahedra as clouds, and sheets, which are facets and leaves as they are drawn.
 
 Leaves sit in clusters, and so do the facets that stand for them: half of the light that an even cloud would let
-through to its surfaces does not reach those of a crown. Where sheets are drawn, they cast shadows in place of their
-tetrahedra.
+through to its surfaces does not reach those of a crown. Sheets that are drawn cast shadows, not their tetrahedra.
 """
 
 from dataclasses import dataclass, replace
@@ -96,8 +95,7 @@ class MediumCells(Arrays):
         """Mean (n,) over all directions of κ, 1/m.
 
         Within 1.3 % of the integral, which single orientations reach: a mean over points of a Fibonacci lattice on the
-        half sphere; κ(ω) = κ(−ω). The form of κ is that of Heitz, Dupuy, Crassin and Dachsbacher, "The SGGX Microflake
-        Distribution", 2015.
+        half sphere; κ(ω) = κ(−ω). The form of κ is that of Heitz et al., "The SGGX Microflake Distribution", 2015.
         """
         index, result = np.arange(_DIRECTIONS) + 0.5, np.zeros(len(self))
         basis = _quadratic(spiral(index / _DIRECTIONS, index, GOLDEN_TURN)).T

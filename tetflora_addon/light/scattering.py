@@ -7,8 +7,7 @@ Hanrahan, "An Efficient Representation for Irradiance Environment Maps", 2001).
 
 A facet is a sheet that scatters as the material of proxies does: evenly over the side of the light or, for the fraction
 of its transmission, over the other side, with a little gloss. A cloud is the paper's blend of a particle term and a
-plane term, in the forms of `docs/architecture.md`. White surfaces in light of radiance 1 from all sides
-have radiance 1.
+plane term, in the forms of `docs/architecture.md`. In light of radiance 1 from all sides, white has radiance 1.
 """
 
 from itertools import permutations, product

@@ -2,9 +2,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Where plants go: on ground that suits them, at a distance from each other, near what they seek.
 
-Arrays only; `blender.placing` makes objects of them. Chance comes from the same hash as in the plants themselves, so
-a seed gives the same arrangement in every version of Blender. Species that
-are sought are placed before those that seek them.
+Arrays only; `blender.placing` makes objects of them. Chance comes from the same hash as in the plants themselves, so a
+seed gives the same arrangement in every version of Blender. Species that others seek come first.
 """
 
 from collections.abc import Mapping, Sequence

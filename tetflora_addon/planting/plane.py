@@ -23,8 +23,7 @@ _ENTRIES = 3_000_000  # about as many pieces of lines are noted in the cells
 def inside_any(points: Floats, polygons: Sequence[Floats]) -> Mask:
     """Which points (n, 2) lie in at least one polygon, (n,).
 
-    Polygons (k, 2) are closed: the last corner is followed by the first. Where one crosses itself, what is wound twice
-    is outside.
+    Polygons (k, 2) go on from the last corner to the first. Of one that crosses itself, what is wound twice is outside.
     """
     inside = np.zeros(len(points), bool)
     for polygon in polygons:
@@ -66,8 +65,7 @@ def _inside(points: Floats, polygon: Floats) -> Mask:
 class Lines:
     """Straight pieces on the map, noted in the cells of a grid within their reach.
 
-    A cell keeps only pieces that can be the nearest of any point in it, so that a long border costs no more than a
-    short one.
+    A cell keeps only pieces that can be the nearest of a point in it: a long border costs no more than a short one.
     """
 
     def __init__(self, start: Floats, end: Floats, reach: Floats) -> None:
@@ -192,8 +190,7 @@ class Neighbors:
 class Spacing:
     """Keeps points apart with a grid whose cells hold one point at most.
 
-    Cells are as large as the distance is on their diagonal, so two points of a cell are always too close, and points
-    that are too close lie at most two cells apart.
+    The diagonal of cells is the distance: two points of a cell are too close, and such points at most two cells apart.
 
     Attributes
     ----------

@@ -87,8 +87,7 @@ class GroundLimits:
 class Rules(GroundLimits):
     """Rules of one population; the defaults leave everything open, those of panels are for a forest.
 
-    Fields with a label are properties of a population, and documented by their tooltips. Lengths are in meters,
-    altitudes z in the world, angles in radians.
+    Fields with a label are properties of a population with tooltips. Meters, radians; altitudes are z in the world.
     """
 
     count: int = setting(

@@ -111,8 +111,7 @@ def by_wetness(wet: Floats, limits: GroundLimits) -> Floats:
 def soft_between(values: Floats, low: float, high: float, softness: float, least: float, most: float) -> Floats:
     """1 between two limits, 0 beyond them, a half at each where there is softness, (n,).
 
-    Limits at the ``least`` and the ``most`` that a value can be have no edge. What ends at a limit and what begins
-    there, with the same softness, make 1 together.
+    Limits at the ``least`` and ``most`` of a value have no edge. What ends and what begins at a limit make 1 together.
     """
     share = np.ones(len(values))
     for inside, used in ((values - low, low > least), (high - values, high < most)):

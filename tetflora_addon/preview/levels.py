@@ -184,8 +184,7 @@ def colors_of(level: Level, mode: str, deepest: int) -> Floats32:
     Parameters
     ----------
     mode : {'LEVEL', 'VISIBILITY', 'FORM', 'CONTRIBUTION'}
-        By how often space was divided, by visibility, by what was decided, or by the logarithm of the pixels that are
-        changed.
+        By how often space was divided, by visibility, by what was decided, or by the logarithm of pixels changed.
     deepest : int
         Depth of the brightest color: colors stay from level to level.
 

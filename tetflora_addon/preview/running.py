@@ -3,8 +3,7 @@
 """Which plants are shown while the timeline runs: some of those in view, with the cover of all.
 
 In a view over a forest each crown hides most of those behind it, and drawing them all takes the longer the more they
-hide each other. A random number of each place decides whether it is shown, so that the same ones are from frame to
-frame, and what is shown is spread evenly.
+hide each other. A random number of each place decides whether it is shown: the same ones in all frames, evenly spread.
 """
 
 from collections.abc import Sequence

@@ -3,8 +3,7 @@
 """Microsurfaces: few facets that stand for the many surfaces of what is not made explicit (paper, sections 1 and 7).
 
 Each facet takes its place, orientation and color from a leaf or branch that the compiled species expects in the
-sub-plant, or from a sample on the faces of an asset. Facets are about as large as a pixel; on average they keep the
-area and orientation of the plants.
+sub-plant, or from a sample on the faces of an asset. Facets are about a pixel large; they keep area and orientation.
 
 Each lies in a plane of the faces of leaves, drawn in proportion to their areas: a folded leaf shows less to the sky
 than a flat one, and a spray of needles has no plane. With leaves' own axes beeches were a quarter too bright.
@@ -34,8 +33,7 @@ from ..refinement.shared_parts import AssetParts, PlacedAssets
 from ..subplants.pieces import Pieces, Thin, wood_areas
 from .hotspots import LightRatios
 
-# Where child indices of facets of leaves and of wood start, and draws of their numbers; then other draws of this
-# module. None may coincide, or facets bunch up.
+# Where child indices of facets of leaves and of wood start, and draws. None may coincide, or facets bunch up.
 _PATHS = {True: (1 << 40, 201), False: (1 << 41, 202)}
 _TURN, _START, _PLACE = 203, 204, 205
 _MOVE = 211  # three draws from here on
@@ -169,8 +167,7 @@ def facet_sites(
 ) -> FacetSites:
     """Facets that areas (n,) are cut into, by the area (n,) of one; their expected number is area / facet.
 
-    From 1 on they divide the area evenly; below, one facet stands for several sub-plants. Facets are left out by the
-    fraction (n,) of their owner that is real.
+    From 1 on they divide the area evenly; below, one stands for several sub-plants. The real fraction (n,) has none.
     """
     expected = area / np.maximum(facet, 1e-300)  # leafless plants have no size of leaves
     counts = np.floor(expected + uniform(key, draw)).astype(np.int64)

@@ -240,8 +240,7 @@ def bounding_capsules(flora: Flora, subplants: Branches) -> Floats:
     Returns
     -------
     (9, n) float64
-        A cylinder, and how far whatever is not within it reaches beyond: center (3), axis (3), radius, half of the
-        height, and that pad. Meters, world space.
+        A cylinder and a pad about it, meters in world space: center (3), axis (3), radius, half of the height, pad.
     """
     bound, pad = bounds(flora, subplants)
     bound = bound.T

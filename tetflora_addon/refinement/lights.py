@@ -178,8 +178,7 @@ def shadows_of(
 ) -> Shadows:
     """Shadows (n,) of hidden tetrahedra on what the camera sees.
 
-    ``decision`` (n,) holds the `Decision` for each of ``cells``; ``ground`` (m, 3) are points that the camera sees
-    beside the plants, see `seen_ground`, meters.
+    ``decision`` (n,) is the `Decision` for each of ``cells``; ``ground`` (m, 3) are points of `seen_ground`, meters.
     """
     count, vertices = len(cells), tree.vertices(cells.nodes)
     pixels, feature = np.zeros(count), np.zeros(count)

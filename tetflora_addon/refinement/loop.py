@@ -313,8 +313,7 @@ def refine(
     polygons : Polygons, optional
         Explicit polygons to refine along with the plants.
     lights : sequence of Light
-        Facets of what throws shadows into the view are finer; the tetrahedra of what is hidden are refined for their
-        shadows as well if ``settings.shadow_cutoff`` is above 0.
+        What throws shadows into the view is finer; hidden tetrahedra are refined for theirs with a ``shadow_cutoff``.
     placed : PlacedAssets, optional
         Instances of assets.
     """

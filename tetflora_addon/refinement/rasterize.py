@@ -95,8 +95,7 @@ def tetrahedron_fragments(vertices: Floats, camera: Camera, width: int, height: 
 def occluder_depth(triangles: Floats, camera: Camera, width: int, height: int) -> Floats:
     """Where each pixel's ray first meets an opaque triangle (height · width,), meters along it; infinite for none.
 
-    The triangles (t, 3, 3) are two-sided, in meters, world space. They may cross the eye's plane; those without area
-    or with coordinates that are not finite are ignored.
+    Triangles (t, 3, 3) are two-sided, in meters, world space, and may cross the eye's plane; invalid ones are ignored.
     """
     nearest = np.full(width * height, np.inf)
     for start in range(0, len(triangles), PRIMITIVE_BATCH):

@@ -13,8 +13,7 @@ from ..parameters import script_setting, setting, within
 class RefinementSettings:
     """Limits of the loop of visibility, refinement and update.
 
-    Fields with a label are properties of a scene, and documented by their tooltips. Sizes are in pixels of the final
-    image.
+    Fields with a label are properties of a scene, documented by their tooltips. Sizes are pixels of the final image.
     """
 
     cutoff: float = setting(

@@ -103,8 +103,7 @@ class SharedParts(Generic[Parts]):
     A pass costs what it changes. Parts that it opens are only marked, and new ones stay in chunks of their own, until
     somebody asks for `parts` or `points`; new points take the places of those on opened parts.
 
-    Parts are `Arrays` with the columns ``totals`` and ``extent``, meters. Subclasses say what can be opened, into what,
-    and which points are on it.
+    Parts are `Arrays` with the columns ``totals`` and ``extent``, meters. Subclasses say what opens and its points.
 
     Parameters
     ----------

@@ -4,8 +4,7 @@
 
 The paper draws the tree front to back and reads an alpha buffer along the way. Since optical depths add up, the same
 numbers come from sorting all fragments by pixel and front-to-back rank: what stands before a fragment is a cumulative
-sum within its pixel. No pixel is visited in a loop. A tetrahedron is drawn once; its fragments stay until it is
-divided.
+sum within its pixel. No pixel is visited in a loop. A tetrahedron's fragments stay until it is divided.
 
 Panoramas have six square views, the faces of a cube, with an alpha buffer each. The views have one eye, so that the
 tree's front-to-back order is that of all of them. What a tetrahedron affects is summed over the faces: the solid angle
@@ -40,8 +39,7 @@ _ACROSS = 8.0
 def depth_in_front(pixel: Integers, depth: Floats) -> tuple[Integers, NDArray]:
     """First fragment of its pixel, and optical depth before it, for each of fragments (n,).
 
-    Fragments are sorted by ``pixel`` and front to back. What all earlier pixels hold is subtracted again from one
-    cumulative sum; rounding must not leave less than nothing.
+    Fragments are sorted by ``pixel`` and front to back. Of one cumulative sum, what earlier pixels hold is subtracted.
     """
     summed = np.cumsum(depth)
     begins = np.flatnonzero(np.diff(pixel, prepend=-1))
@@ -90,8 +88,7 @@ class AlphaBuffer:
         self.width, self.height = buffer_size(camera, resolution)
         self.end = occluders_depth
         self._cell, self._pixel = np.zeros((2, 0), np.int32)
-        # Optical depth that a fragment brings into its pixel, the visible fraction of its tetrahedron that it covers,
-        # and the transmittance of what is before it.
+        # Optical depth of a fragment, the visible fraction of its tetrahedron that it covers, and transmittance before.
         self._depth, self._fraction, self._before = np.zeros((3, 0))
         self._changed = np.zeros(self.width * self.height, bool)
 

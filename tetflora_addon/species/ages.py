@@ -207,8 +207,7 @@ class _Aged:
 
     ``stem`` and ``last`` are the order of the stem, and of the twigs. By order, ``whole`` are typical lengths when
     full-grown, meters; ``now`` and ``before`` lengths over those, now and a year ago; ``stout`` radii over those when
-    full-grown. ``fresh`` is the fraction of the branches on which there are more that live for a while, ``thin`` a
-    factor on the number of leaves.
+    full-grown. ``fresh`` is the fraction of branches with more that live for a while, ``thin`` a factor on leaves.
     """
 
     def __init__(self, species: Species, ages: Ages, years: float) -> None:
@@ -244,8 +243,7 @@ class _Aged:
         if self.stem + 1 >= self.last or self.dead:
             return out
         # Leaves follow the trunk that supplies them (leaf areas of McPherson, van Doorn and Peper, 2016): young trees
-        # have more branches on a meter than will stay, where limbs alone do not bear so much, and fewer leaves where
-        # these bear more.
+        # have more branches on a meter than will stay where limbs bear less, and fewer leaves where these bear more.
         leaves = self.ages.diameters(self.years) ** self.ages.leaves * self.leafless
         closed = max(self.height / _SMALL, self.ages.heights(self.years))  # low shrubs' crowns at their full height
         wanted = expected_leaf_area(self.one) * leaves * min(closed, 1.0)

@@ -1,7 +1,6 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Species files: every key with its type and allowed range, every mistake named; and the catalog: those shipped with
-the extension, and folders of the user's own.
+"""Species files: every key with its type and range, every mistake named; and the catalog: shipped ones and users'.
 
 `docs/species.md` is written from the fields of `Order` and of the leaves.
 """

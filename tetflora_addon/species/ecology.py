@@ -42,8 +42,7 @@ def one_sided(species: Species) -> float:
 def ecology_of(species: Species) -> Ecology:
     """What a species needs; without a description, as plants of its size are.
 
-    Heights and basal diameters follow from its orders: what is described is taken to be three quarters as tall as the
-    largest.
+    Heights and basal diameters follow from its orders, which are taken to be three quarters as tall as the largest.
     """
     if species.ecology is not None:
         return species.ecology

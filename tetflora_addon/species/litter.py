@@ -6,8 +6,7 @@ Each is a page of a species file, made from that of the living plant: the same l
 are a centimeter or two high, so that what grows on them sideways lies on the ground.
 
 Leaves that have just fallen are litter with a year of their own, from the fall of their tree's leaves until they rot in
-spring. What is on the ground on a day is what is no longer on the trees, leaf by leaf on average, because leaves of the
-patch appear as those of the tree fall.
+spring. On the ground is what is no longer on the trees: leaves of the patch appear as those of the tree fall.
 """
 
 from collections.abc import Callable, Mapping

@@ -2,8 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """How many branches, leaves and short shoots one plant has on average, from its description alone.
 
-The same numbers as those that a compiled species holds, for readers of files and levels of detail, which have to know
-them before anything is compiled.
+The same numbers as a compiled species holds, for readers of files and levels of detail, before anything is compiled.
 """
 
 from dataclasses import dataclass

@@ -170,8 +170,7 @@ def nurbs_chain(
 def joined_edges(chains: Chains) -> tuple[Floats, Integers, Integers]:
     """One graph of chains; those that begin on another are moved onto its line and joined to it there.
 
-    A chain begins on another where its first point, or else its last, is nearer to the other's line than its radius
-    there, or than 1 % of the size of all.
+    A chain begins on another where its first point, or else its last, is within its radius, or 1 % of the size of all.
 
     Returns
     -------
@@ -396,8 +395,7 @@ def skeleton_from_edges(
     Raises
     ------
     SpeciesError
-        No edge of any length, numbers that are not finite, a negative radius, an edge to a point that is not there, or
-        more than `MAX_POINTS` points.
+        No edge of any length, numbers that are not finite, a negative radius, an edge to no point, or too many points.
 
     Notes
     -----
@@ -450,8 +448,7 @@ def drawn_branches(skeleton: Skeleton) -> DrawnBranches:
     """Split a skeleton into branches.
 
     At each fork the child on the same line goes on; of equals, the one with the largest radius; of these, the one with
-    the longest way to a tip. A side branch takes its radius at the fork from its own points, as far as these
-    determine it, not from its parent.
+    the longest way to a tip. A side branch takes its radius at the fork from its own points where these have one.
     """
     points, radius, parent = skeleton.points, skeleton.radius, skeleton.parent.astype(np.int64)
     n = len(points)
@@ -526,8 +523,7 @@ def _pipe_radii(points: Floats, parent: Integers) -> Floats:
 def _base_radius(knots: Floats, radius: Floats, base: Integers, count: Integers) -> Floats:
     """Radii (s,) at the first knots ``base`` (s,) of side branches of ``count`` knots (s,); those given are the forks'.
 
-    The taper between its own first two points, continued to the fork; half of the fork's radius for a branch that has
-    only a tip of radius 0.
+    The taper between its own first two points, continued to the fork; half of the fork's radius for a bare tip.
     """
     fork, here, beyond = radius[base], radius[base + 1], np.where(count > 2, base + 2, base + 1)
     run = np.linalg.norm(knots[base + 1] - knots[base], axis=1)

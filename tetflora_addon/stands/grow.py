@@ -2,8 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Grow a stand: year after year plants shade each other, grow, die, fall, and seeds of the others come up.
 
-All random numbers are hashes of the seed, the plant and the year, and sums are of whole numbers: the stand is the same
-whatever the number of threads.
+Random numbers are hashes of seed, plant and year, and sums are of whole numbers: any number of threads gives the same.
 
 Wood grows in proportion to the light that leaves take, less what the leaves cost (Monteith, "Climate and the efficiency
 of crop production in Britain", 1977). Trunks grow taller for their basal diameter where it is dark beside them, crowns
@@ -532,8 +531,7 @@ class StandSettings:
 def grow(site: StandSite, species: Sequence[StandSpecies], settings: StandSettings) -> Job[Records]:
     """Grow a stand; a job, which yields after each year and returns its records.
 
-    These are of plants at year 0, each ``interval`` years, at the end, and whenever one appears, dies, falls or is
-    gone; with an interval of 0 those of the end alone.
+    Of plants at year 0, each ``interval`` years (0: only at the end), and whenever one appears, dies, falls or is gone.
 
     Raises
     ------

@@ -12,8 +12,7 @@ Leaves are whole numbers of a small unit, so that sums do not depend on their or
 
 Which columns of a grid a crown covers, seen from above: tables of discs, by their radius and their place in a cell.
 
-Crowns are looked up, not drawn: radius and middle are rounded to a fraction of a cell, so that what a crown covers is
-a run of a table.
+Crowns are looked up, not drawn: radius and middle are rounded to a part of a cell, so a crown covers a run of a table.
 """
 
 from dataclasses import dataclass, field

@@ -2,8 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Leaves as polygons: copies of the species' leaf models, written straight into the arrays of their mesh.
 
-See section 5 of the paper. What is small in the image may be a kite, and what is large has finer levels, see
-`leaves.levels`.
+See section 5 of the paper. What is small in the image may be a kite; what is large has levels, see `leaves.levels`.
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -35,8 +34,7 @@ class LeafCopies:
     Parameters
     ----------
     of : LeafModel, LeafKites or LeafLevel
-        A model; kites that stand for one, of which keys choose a plane; or a finer level, of which they choose a
-        variant, and which is shaded smooth.
+        A model; kites for one, of which keys choose a plane; or a finer, smooth level, of which they choose a variant.
     number : int
         Of copies in the end, at most.
     transmission : float

@@ -3,8 +3,7 @@
 """Tubes around branches: rings of vertices, joined by quads (paper, section 5).
 
 Twigs thinner than a pixel are one triangle from base to tip each, or a ribbon along those that bend. It has half of the
-surface of the twig's tube, turned about its line at random: over many twigs the area that is seen from any direction is
-that of the tubes, whose far side is never seen.
+surface of the twig's tube, turned about its line at random: over many twigs the area seen is that of tubes.
 """
 
 from collections.abc import Iterator, Sequence

@@ -68,16 +68,14 @@ def view_root(camera: ViewingCamera, bounds: ArrayLike) -> TetrahedralTree:
     Parameters
     ----------
     camera : Camera or alike
-        Whose view it is; the window may be asymmetric and need not contain the axis. What is nearer than ``near``
-        counts as part of the view.
+        Whose view it is; the window may be asymmetric, without the axis. What is before ``near`` is in the view.
     bounds : (2, 3) float64
         Lowest and highest corner of the world box that holds plants, polygons and lights, meters.
 
     Returns
     -------
     TetrahedralTree
-        The pyramid of a perspective view is two terminals, the box of an orthographic one six. They are marked
-        `inside`, all others are not; children inherit it.
+        The pyramid of a perspective view is two terminals, the box of an orthographic one six, all marked `inside`.
 
     Raises
     ------
@@ -283,8 +281,7 @@ def world_root(bounds: ArrayLike, origin: ArrayLike = (0.0, 0.0, 0.0)) -> Tetrah
     Parameters
     ----------
     bounds : (2, 3) float64
-        Lowest and highest corner of what is in the scene, meters. The eye may be anywhere: what is outside all cubes
-        has an order too.
+        Lowest and highest corner of the scene, meters. The eye may be anywhere: what is outside has an order too.
     origin : (3,) float64
         Where in the world coordinates begin, whole meters: cubes are those of the world.
 

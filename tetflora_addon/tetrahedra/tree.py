@@ -119,8 +119,7 @@ def best_diagonal(vertices: Floats) -> Integers:
     Returns
     -------
     (n,) intp
-        Diagonal ``k`` joins the middles of edges ``k`` and ``5 - k`` of `geometry.EDGES`; the first of those that are
-        equally good.
+        Diagonal ``k`` joins the middles of edges ``k`` and ``5 - k`` of `geometry.EDGES`; the first of equals.
 
     Notes
     -----
@@ -153,8 +152,7 @@ def divide_in_eight(vertices: Floats, diagonal: Integers | None = None) -> tuple
         Cutting planes ``(nx, ny, nz, d)``, unit normals, in the order of a heap: plane ``i`` is followed by plane
         ``2 i + 1`` on side 0 and by plane ``2 i + 2`` on side 1.
     children : (n, 8, 4, 3) float64
-        Positively oriented; child ``4 s + 2 t + u`` lies on sides ``s``, ``t`` and ``u`` of the three planes that lead
-        to it. Even ones are the corners.
+        Positively oriented; child ``4 s + 2 t + u`` is on sides ``s``, ``t``, ``u`` of its planes; even are corners.
     """
     diagonal = best_diagonal(vertices) if diagonal is None else diagonal
     middles = (vertices[:, EDGES[:, 0]] + vertices[:, EDGES[:, 1]]) / 2.0
@@ -167,8 +165,7 @@ def divide_in_eight(vertices: Floats, diagonal: Integers | None = None) -> tuple
 def divide_by_shape(vertices: Floats) -> tuple[Floats, Floats]:
     """Divide tetrahedra ``(n, 4, 3)`` into eight in the way that keeps them in better shape, so that no slivers arise.
 
-    Both ways give eight of equal volume, three planes deep. Worst qualities are compared, with a `HANDICAP` on the
-    bisection of compact tetrahedra.
+    Both ways give eight of equal volume, three planes deep. Worst qualities count, bisection with a `HANDICAP`.
 
     Parameters
     ----------
@@ -219,8 +216,7 @@ class TetrahedralTree:
     Parameters
     ----------
     vertices : (4, 3) float64, optional
-        Tetrahedron of the root, positively oriented, meters. Without it the root is a region to be divided by
-        `divide`.
+        Tetrahedron of the root, positively oriented, meters. Without it the root is a region for `divide`.
     """
 
     def __init__(self) -> None:

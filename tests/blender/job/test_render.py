@@ -4,7 +4,9 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
+from types import SimpleNamespace
 
 import bpy
 import numpy as np
@@ -12,7 +14,7 @@ import pytest
 
 from tests.blender.scenes import add_camera, add_mesh, add_plant, datablocks, depsgraph, tiny_render
 from tetflora_addon import errors
-from tetflora_addon.blender import compat
+from tetflora_addon.blender import compat, runtime
 from tetflora_addon.blender.job import refine, render
 from tetflora_addon.blender.materials import nodes
 from tetflora_addon.blender.results import collection, hiding, proxy_kinds
@@ -161,6 +163,57 @@ def test_a_render_that_will_show_no_plants_says_so_once(stage, tmp_path, capfd):
     hiding.keep_results(stage)
     _still(stage, tmp_path / "c.png")
     assert "nothing is refined" not in capfd.readouterr().err
+
+
+def test_the_window_says_how_far_plants_are_until_they_are_there(stage, monkeypatch, tmp_path):
+    said = []
+    monkeypatch.setattr(render, "later", lambda function: said.append(getattr(function, "args", ("",))[0]))
+    monkeypatch.setattr(render, "_OFTEN", 0.0)
+    _still(stage, tmp_path / "a.png")
+    assert len(said) > 3 and said[-1] == "" and "" not in said[:-1]
+    assert any("Making polygons" in text for text in said) and all(text.startswith("TetFlora ") for text in said[:-1])
+    said.clear()
+    bpy.data.objects["plant"].tetflora.enabled = False
+    _still(stage, tmp_path / "b.png")
+    assert said[-1] == ""
+
+
+def test_status_bars_and_the_picture_that_is_rendered_show_a_text(monkeypatch):
+    """As far as there are windows; a text of none takes it away."""
+    shown, usual = [], []
+
+    def editor(kind, *image):
+        active = SimpleNamespace(image=next((SimpleNamespace(type=one) for one in image), None))
+        return SimpleNamespace(type=kind, spaces=SimpleNamespace(active=active), header_text_set=shown.append)
+
+    areas = [editor('IMAGE_EDITOR', 'RENDER_RESULT'), editor('IMAGE_EDITOR', 'IMAGE'), editor('IMAGE_EDITOR')]
+    screen = SimpleNamespace(areas=[*areas, SimpleNamespace(type='VIEW_3D')])
+    window = SimpleNamespace(screen=screen, workspace=SimpleNamespace(status_text_set=usual.append))
+    context = SimpleNamespace(temp_override=lambda **_: contextlib.nullcontext())
+    context.window_manager = SimpleNamespace(windows=[window])
+    monkeypatch.setattr(runtime, "bpy", SimpleNamespace(context=context))
+    runtime.show_status("half   |   keys")
+    runtime.show_status()
+    assert shown == ["half", None] and usual == ["half   |   keys", None]
+
+
+def test_panels_learn_what_the_refinement_of_a_render_took(stage, monkeypatch, tmp_path):
+    learned = []
+    monkeypatch.setattr(render, "learn", lambda expected, seconds: learned.append(seconds))
+    monkeypatch.setattr(render, "redraw", lambda: learned.append("redrawn"))
+    _still(stage, tmp_path / "a.png")
+    took = sum(json.loads(stage.tetflora.statistics)["seconds"].values())
+    assert learned == [pytest.approx(took), "redrawn"]
+    stage.tetflora.refine_at_render = False
+    _still(stage, tmp_path / "b.png")
+    assert len(learned) == 2
+
+
+def test_a_scene_that_undo_took_is_left_alone():
+    """What was to be shown again in it, as soon as the main thread looks."""
+    scene = bpy.data.scenes.new("other")
+    bpy.data.scenes.remove(scene)
+    render._take_back(scene)
 
 
 def test_disabled_plants_are_no_error(stage, tmp_path):

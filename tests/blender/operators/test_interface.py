@@ -14,6 +14,8 @@ from panels import base, layers
 from tests.blender.scenes import add_mesh, select
 from tetflora_addon.blender.biomes.layers import active_layer
 from tetflora_addon.blender.geodata.origin import KEY
+from tetflora_addon.blender.placing.populations import add_population
+from tetflora_addon.blender.placing.rules import fingerprint
 
 pytestmark = pytest.mark.usefixtures("clean_file")
 
@@ -71,6 +73,11 @@ def test_the_scene_tab_says_where_on_earth_the_scene_lies(epsg, text):
     assert text in [options.get("text") for name, _, options in layout.drawn if name == "label"]
 
 
+def test_the_wind_says_that_it_is_a_speed():
+    speed = bpy.context.scene.tetflora.wind.bl_rna.properties["speed"]
+    assert speed.unit == 'VELOCITY'
+
+
 def test_rows_of_lists_are_drawn_to_be_timed():
     timed = {bpy.types.TETFLORA_UL_layers, bpy.types.TETFLORA_UL_species}
     assert set(interface.classes("TETFLORA_UL_")) - timed == {bpy.types.TETFLORA_UL_inventory_columns}  # of a dialog
@@ -79,6 +86,25 @@ def test_rows_of_lists_are_drawn_to_be_timed():
     bpy.context.scene.tetflora.output.add_species = "oak"
     rows = {name: draw() for name, draw in interface.lists(interface._context()).items()}
     assert rows == {"TETFLORA_UL_layers.0": 1, "TETFLORA_UL_species.0": 2, "TETFLORA_UL_species.1": 1}
+
+
+@pytest.mark.parametrize(("kind", "icons"), [('BIOME', 3), ('SCATTER', 2)])
+def test_names_of_layers_have_most_of_their_row(kind, icons):
+    """A list of usual width has 195 pixels, of which each icon takes 20; the name is a field without any."""
+    layer = add_population(bpy.context.scene, name="Beech Forest with Ferns")
+    layer.kind, layer.made, layer.placed_by = kind, 26_123, fingerprint(layer)
+    layout = Layout()
+    layers.TETFLORA_UL_layers.draw_item(None, None, layout, None, layer, 0, None, "", 0, 0)
+    shown = [options.get("icon", 'NONE') for _, _, options in layout.drawn]
+    assert sum(icon not in {'NONE', 'FILE_REFRESH'} for icon in shown) <= icons  # the latter is in place of a number
+    assert next(o.get("icon") for name, given, o in layout.drawn if name == "prop" and given[1] == "name") is None
+
+
+@pytest.mark.parametrize(
+    ("number", "text"), [(999, "999"), (1213, "1.2k"), (9950, "10k"), (26_123, "26k"), (999_500, "1.0M")]
+)
+def test_numbers_beside_names_are_short(number, text):
+    assert layers._short(number) == text
 
 
 @pytest.mark.parametrize("message", ["", "Too few"])

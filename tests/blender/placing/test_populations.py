@@ -389,3 +389,13 @@ def test_of_several_layers_it_is_said_which_have_no_room(monkeypatch: pytest.Mon
     )
     _ops().update_layers()
     assert f'without plants: {_settings().layers[1].name}: ' in said[0]
+
+
+@pytest.mark.parametrize(
+    ("name", "free"),
+    [("Scatter", "Scatter.002"), ("Scatter.001", "Scatter.002"), ("No. 1", "No. 1"), ("a.x", "a.x.001")],
+)
+def test_a_copy_of_a_copy_has_one_number(name, free):
+    for taken in ("Scatter", "Scatter.001", "a.x"):
+        _settings().layers.add().name = taken
+    assert populations.free_name(_settings().layers, name) == free

@@ -3,8 +3,7 @@
 """Objects and collections as species, and objects as scatterers: what the artist marks, and what can be marked.
 
 Which objects are species is stored with the scene and not with them, so that those that are linked can be species too.
-An identifier follows from the name that the asset has when it becomes a species: taken off the list and put on again,
-it is the species of the same plants.
+An identifier follows from the name of the asset when it becomes a species: put on the list again, it is the same.
 
 How large they are, and a small picture of them for menus, follow from points on their surface, within a moment: nothing
 is compiled and no renderer is asked. Materials count by their mean color.

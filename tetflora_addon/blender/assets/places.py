@@ -6,10 +6,9 @@ An asset is an object, a collection, or geometry that nodes instance without an 
 collections, nodes and particles is followed down to meshes, each with all of its places in the asset. Its digest, of
 meshes, materials and images, tells whether what it shows has changed since it was compiled.
 
-Assets stand where marked objects scatter them, and where plants do whose species is an asset. An object's nodes,
-particles or collection are followed to the first level of what they instance: that are the assets. A group of instances
-without anything of its own is opened, so that what is a tree counts as the asset; one of very many parts is taken for a
-tree itself. All places of an asset are computed at once, as arrays.
+Assets stand where marked objects scatter them, and where plants do whose species is an asset: the first level of what
+nodes, particles or a collection instance. A group without anything of its own is opened, so that what is a tree counts;
+one of very many parts is taken for a tree. All places of an asset are computed at once, as arrays.
 """
 
 import hashlib
@@ -29,8 +28,8 @@ from ...assets.asset import AssetSource, AssetSurface
 from ...errors import SceneError
 from ...growth.hashing import child_key, key_of_seed, uniform
 from ...jobs import mapped
-from ..attributes import image_pixels, members, mesh_of, read, values_of, world_matrix
-from ..compat import tree_in_use
+from ..attributes import KINDS, image_pixels, members, mesh_of, read, values_of, world_matrix
+from ..compat import stored_inputs, tree_in_use
 from ..materials.face_looks import FaceReader
 from ..materials.node_values import settings_of
 from ..materials.nodes import is_ours
@@ -46,6 +45,7 @@ from ..scene.objects import (
     listed_instances,
     materials_of,
     name_keys,
+    objects_within,
     renderable_objects,
 )
 from ..scene.plants import AssetPlants, read_asset_plants
@@ -111,6 +111,7 @@ def _plain(value: Any) -> object:
         return value.name_full
     if isinstance(value, bpy.types.bpy_struct):
         return None
+    value = sorted(value) if isinstance(value, set) else value
     return tuple(value) if hasattr(value, "__len__") and not isinstance(value, str) else value
 
 
@@ -133,6 +134,41 @@ def image_digest(image: bpy.types.Image) -> str:
     except OSError:
         return how + f"{path}"
     return how + f"{path} {stat.st_size} {stat.st_mtime_ns}"
+
+
+#: What all datablocks and all modifiers have, but for whether these render; and what makes objects take part.
+_EVERY = bpy.types.ID.bl_rna.properties.keys() + bpy.types.Modifier.bl_rna.properties.keys()
+_COMMON = {*_EVERY, "animation_data"} - {"show_render"}
+_ROLE = ("is_plant", "is_field", "is_explicit", "is_occluder", "is_scatter", "enabled", "species", "seed", "age")
+
+
+def _settings_in(owner: bpy.types.bpy_struct, deepest: int = 4) -> list[tuple[str, object]]:
+    names = [p.identifier for p in owner.bl_rna.properties if p.identifier not in _COMMON and p.type != 'COLLECTION']
+    found = {name: getattr(owner, name) for name in names}
+    inner = {n: v for n, v in found.items() if deepest and isinstance(v, bpy.types.bpy_struct) and _plain(v) is None}
+    return [(n, _settings_in(v, deepest - 1) if n in inner else _plain(v)) for n, v in found.items()]
+
+
+def form_of(obj: bpy.types.Object, deepest: int = DEEPEST) -> str:
+    """Digest of what an object shows, as it is stored, with modifiers and what its collection holds, unevaluated."""
+    data = obj.data
+    said: list[object] = [(m.type, _settings_in(m), stored_inputs(m)) for m in obj.modifiers]
+    said += [[getattr(obj.tetflora, name) for name in _ROLE], *(_look_of(slot.material) for slot in obj.material_slots)]
+    if data is not None and not hasattr(data, "attributes"):
+        splines = getattr(data, "splines", ())
+        said += [_settings_in(data), [[p.co[:] for p in (*s.points, *s.bezier_points)] for s in splines]]
+    content = hashlib.sha256(repr((obj.type, said)).encode())
+    for attribute in getattr(data, "attributes", ()):
+        if attribute.data_type in KINDS and (attribute.name == ".corner_vert" or not attribute.name.startswith(".")):
+            content.update(f"{attribute.name} {attribute.domain}".encode())
+            content.update(values_of(attribute))
+    for inner in objects_within(obj.instance_collection) if obj.instance_collection and deepest else ():
+        content.update(repr((inner.matrix_world[:], form_of(inner, deepest - 1))).encode())
+    return content.hexdigest()
+
+
+def _look_of(material: bpy.types.Material | None) -> object:
+    return material and (tuple(material.diffuse_color), (tree := tree_in_use(material)) and _tree(tree))
 
 
 Slots = list[bpy.types.Material | None]
@@ -308,9 +344,7 @@ def digest_of(target: Target, depsgraph: bpy.types.Depsgraph, parts: list[AssetP
 
 
 def _add_mesh(content: "hashlib._Hash", mesh: bpy.types.Mesh, slots: Slots) -> None:
-    content.update(
-        repr([m and (tuple(m.diffuse_color), (tree := tree_in_use(m)) and _tree(tree)) for m in slots]).encode()
-    )
+    content.update(repr([*map(_look_of, slots)]).encode())
     content.update(f"{len(mesh.vertices)} {len(mesh.polygons)} {len(mesh.loops)}".encode())
     content.update(read(mesh, "position"))
     content.update(read(mesh, ".corner_vert"))

@@ -66,8 +66,7 @@ def add_biome_steps(
     Raises
     ------
     SceneError
-        It needs a species that the catalog does not have, or no layer finds any place; or something was deleted
-        meanwhile.
+        It needs a species that the catalog lacks, no layer finds any place, or something was deleted meanwhile.
     """
     scene, depsgraph = data.scene, data.depsgraph
     data.add_objects(grounds)

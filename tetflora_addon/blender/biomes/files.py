@@ -274,9 +274,7 @@ _SIDES, _QUALITY = (320, 200), 82
 
 
 def saved_populations(scene: bpy.types.Scene) -> list[bpy.types.PropertyGroup]:
-    """What would be saved: the layers of the active biome or, without one, the populations on the ground of the active
-    population.
-    """
+    """What would be saved: layers of the active biome, or without one populations on the ground of the active."""
     biome = active_biome(scene)
     if biome is not None:
         return layers_of(scene, biome.uid)

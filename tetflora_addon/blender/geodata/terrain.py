@@ -6,8 +6,7 @@ Ground is a smooth mesh with UV and soil. The engine reads all but pixels of PNG
 whole numbers by the largest of their type, as long as the image's color space is Non-Color.
 
 Each kind of outlines has a collection: areas and paths of populations, and things to see. Woods and meadows are closed
-curves on the ground. Water is flat and filled, buildings stand on the lowest of their corners, roads are ribbons: a
-curve that is tilted on its side and extruded.
+curves on the ground. Water is flat, buildings stand on their lowest corner, roads are ribbons.
 """
 
 import struct

@@ -2,8 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Input of refinement from a scene: plants, meshes, lights, compiled species and assets, and settings.
 
-Meshes of assets are read here, one asset at a time; the engine compiles each in its thread. What was compiled before is
-found by its digest.
+Meshes of assets are read here, one asset at a time; the engine compiles each in its thread, and keeps it by a digest.
 """
 
 from collections.abc import Generator, Mapping, Sequence
@@ -62,8 +61,7 @@ class SceneContents:
     """Contents of a scene; ``explicit`` is None where no mesh takes part, ``sources`` where no light is baked.
 
     ``owners`` are the objects of the plants in their order, each with the number of its own; ``places`` are those of
-    assets, ``looks`` those of the objects that show these; ``unknown`` tells of plants that were left out because
-    nobody has their species.
+    assets, ``looks`` those of the objects that show these; ``unknown`` tells of plants without a known species.
     """
 
     seeds: Seeds
@@ -161,8 +159,7 @@ def read_scene(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> SceneC
 def compile_for(identifiers: tuple[str, ...], scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> Flora:
     """Load and compile species, leaf objects of the scene included.
 
-    Without any, for meshes alone, it is a shipped one of which nothing grows: the artist's own files and edits that the
-    scene does not use must not take time or raise errors.
+    Without any, it is a shipped one of which nothing grows: files and edits that are not used must not raise errors.
 
     Raises
     ------

@@ -2,8 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The frame cache: results of a render that later frames use again, found by a digest of all that they depend on.
 
-A frame with the digest of an earlier one gets its results back; the least recently used go first when the cache is
-full. The camera counts by its cell (`camera.view_cells`), so that neighboring frames have the same digest.
+A frame with an earlier digest gets its results back; the least recently used go first. The camera counts by its cell.
 """
 
 import hashlib

@@ -4,8 +4,7 @@
 
 The engine works in a thread beside Blender's (`worker`); only reading and writing datablocks happens here.
 
-While Blender takes one block of polygons over, the engine makes the next in its thread. Instances of assets are
-originals where they are whole, and meshes of clusters where some of them are near.
+While Blender takes one block over, the engine makes the next. Instances of assets are originals or meshes of clusters.
 """
 
 import json
@@ -13,6 +12,7 @@ from collections.abc import Callable, Generator, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from itertools import groupby
+from typing import Any
 
 import bpy
 import numpy as np
@@ -69,8 +69,7 @@ _MANY = 1e6
 class _Run:
     """One refinement: what it reads, what it has made of that, and where results go.
 
-    The camera and the contents are None until they are read; ``beside`` are earlier results that stay, ``originals``
-    objects whose place results take.
+    Camera and contents are None until read; ``beside`` are earlier results that stay, ``originals`` what they replace.
     """
 
     depsgraph: bpy.types.Depsgraph
@@ -460,9 +459,10 @@ def _replace(run: _Run) -> None:
     results.finish()
 
 
-def refine(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, **options: object) -> Statistics:
-    """Refine a scene at once; options and errors as for `refine_steps`."""
-    return run_to_end(refine_steps(scene, depsgraph, **options))
+def refine(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, **options: Any) -> Statistics:
+    """Refine a scene at once; ``tell`` gets the progress of each step, other options and errors are `refine_steps`'."""
+    tell = options.pop("tell", lambda _: None)
+    return run_to_end(mapped(refine_steps(scene, depsgraph, **options), tell))
 
 
 def clear(scene: bpy.types.Scene, for_render: bool | None = None) -> int:

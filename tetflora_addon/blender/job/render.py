@@ -9,11 +9,12 @@ Their order has these reasons (tried on 4.5 and 5.2):
 - 5.2 crashes if objects that were rendered are deleted in ``render_post`` or ``render_write``, while the renderer still
   holds them. They are deleted in the next ``render_pre``, and in ``render_complete`` or ``render_cancel`` at the end.
 - Results of a render are marked as runtime data, which Blender never writes into a file.
-- With a window, handlers run in the thread of the render: what links, hides or removes goes to the main thread; without
-  *Lock Interface*, everything does.
+- With a window, handlers run in the render's thread: what links, hides or removes goes to the main thread, and without
+  *Lock Interface* everything.
 """
 
 import sys
+import time
 import traceback
 from dataclasses import dataclass, field
 from functools import partial
@@ -21,18 +22,22 @@ from functools import partial
 import bpy
 
 from ...errors import TetFloraError
-from ..main_thread import in_main_thread, restore_in_main_thread, window_draws
+from ...jobs import Progress
+from ..main_thread import in_main_thread, later, restore_in_main_thread, window_draws
 from ..results import hiding
 from ..results.collection import has_results, leave_out_of_file, result_collections
 from ..results.output import KIND, adopt_materials, release_materials
 from ..results.proxy_kinds import raise_settings
-from ..runtime import Listeners, complain, failed_frames, handlers, remember, with_uid
+from ..runtime import Listeners, complain, failed_frames, handlers, is_there, redraw, remember, show_status, with_uid
 from ..saved_files import clear_unreadable, migrate
 from ..scene.objects import has_contents, has_plants, show_in, view_layer_groups
 from ..scene.plants import NoPlantsError
 from ..species.edits import looked_at_once
 from . import frame_cache, refine
 from .contents import asset_warnings, read_scene
+from .forecast import forecast, learn
+
+_OFTEN = 0.2  # seconds between two texts about plants that are prepared
 
 
 @dataclass
@@ -46,6 +51,8 @@ class _Rendering:
     outer: int = 0  # scene that is rendered; those that its sequencer shows begin and end renders of their own
     scenes: list[int] = field(default_factory=list)  # all of these
     warnings: list[str] = field(default_factory=list)
+    told: float = 0.0  # when it was said last how far plants are; 0 where nothing is shown
+    took: float = 0.0  # seconds of the last refinement
 
 
 _rendering = _Rendering()
@@ -108,6 +115,9 @@ def on_render_pre(scene: bpy.types.Scene, _depsgraph: object = None) -> None:
             restore_in_main_thread(partial(_take_back, scene))
             if has_results(scene):
                 _rendering.raised.setdefault(scene.session_uid, {}).update(raise_settings(scene))
+        if _rendering.told:
+            _rendering.told = 0.0
+            later(show_status)
         _rendering.busy = False
 
 
@@ -124,6 +134,8 @@ def on_render_end(scene: bpy.types.Scene, _depsgraph: object = None) -> None:
         for other in bpy.data.scenes:
             if other.session_uid in rendered and other.library is None:
                 restore_in_main_thread(partial(_take_back, other))
+        if _rendering.took:
+            restore_in_main_thread(partial(_learn, scene))
     finally:
         _rendering.busy, _rendering.outer = False, 0
         _rendering.scenes.clear()
@@ -169,6 +181,7 @@ def on_load_post(_path: object, _other: object = None) -> None:
 
 def _make(scene: bpy.types.Scene) -> None:
     """Make results for the frame to be rendered, and hide the artist's own results."""
+    _tell(Progress(0.0, "Reading the scene"))
     in_main_thread()  # before the view layers are evaluated here
     # Also where nothing is animated: the renderer does so next, and only this gives a depsgraph of the frame.
     scene.frame_set(scene.frame_current, subframe=scene.frame_subframe)
@@ -184,9 +197,10 @@ def _make(scene: bpy.types.Scene) -> None:
         layer, there = layers[0], in_main_thread(partial(frame_cache.recall, scene, key))
         new = [] if there is None else [there]
         if there is None:
-            options = {"for_render": True, "camera": camera, "given": given, "mark": key[:8]}
+            options = {"for_render": True, "camera": camera, "given": given, "mark": key[:8], "tell": _tell}
             before = result_collections(scene, 'RENDER')
             statistics = refine.refine(scene, layer.depsgraph, beside=before, **options)
+            _rendering.took = sum(statistics.seconds.values())
             if statistics.unknown:
                 _complain(scene, f"without some plants: {statistics.unknown}")
             elif statistics.left_out:
@@ -203,6 +217,24 @@ def _make(scene: bpy.types.Scene) -> None:
         for layer in scene.view_layers:
             layer.update()
     _rendering.raised.setdefault(scene.session_uid, {}).update(raise_settings(scene))
+
+
+def _tell(progress: Progress) -> None:
+    """Say in the window how far plants are: Blender itself says "Rendering" and 0 % meanwhile."""
+    if (now := time.monotonic()) - _rendering.told > _OFTEN:
+        _rendering.told = now
+        text = (
+            f"TetFlora {progress.fraction:4.0%}   {progress.message}   |   The window is locked until the render ends"
+        )
+        later(partial(show_status, text))
+
+
+def _learn(scene: bpy.types.Scene) -> None:
+    """What a refinement took is what panels expect of the next one, whoever began it."""
+    if is_there(scene) and not scene.render.use_border:
+        learn(forecast(scene, scene.view_layers[0]), _rendering.took)
+    _rendering.took = 0.0
+    redraw()
 
 
 def _layers_of(scene: bpy.types.Scene) -> list[list[bpy.types.ViewLayer]]:
@@ -222,6 +254,8 @@ def _hide(scene: bpy.types.Scene, keys: list[str]) -> None:
 
 
 def _take_back(scene: bpy.types.Scene) -> None:
+    if not is_there(scene):  # undo, for which the main thread has waited
+        return
     _show_hidden()
     _rendering.hidden.clear()
     _lower(scene.session_uid)

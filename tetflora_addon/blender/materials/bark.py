@@ -272,8 +272,7 @@ def _bark(character: str) -> Bark:
 
 
 # What patterns are made of. Nodes that feed a height are worked out three times by the bump that follows, so one search
-# for cells gives all that a pattern wants to know: how far the border is, how it runs, which cell it is, and where its
-# middle lies.
+# for cells gives all that a pattern wants to know: how far the border is, how it runs, which cell it is, its middle.
 
 
 def times(place: Term, x: float, z: float) -> Term:

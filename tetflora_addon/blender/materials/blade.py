@@ -94,8 +94,7 @@ def blade_group(kind: str) -> bpy.types.NodeTree:
     -------
     bpy.types.NodeTree
         Inputs Color, Leaf Length, Veins, Midrib, Vein Lines, Dark Against Light, Relief, Mottling, Wear, Paler
-        Underside, Gloss, Roughness. Outputs Reflected and Through, the colors of reflected and of passing light; Gloss;
-        Roughness; Normal.
+        Underside, Gloss, Roughness. Outputs Reflected and Through, colors of light; Gloss; Roughness; Normal.
     """
     blade = BLADES[kind]
     inputs = (

@@ -171,8 +171,7 @@ def from_hsv(color: Values) -> Values:
 
 Stack = tuple[bpy.types.Node, ...]  # groups that the walk is in
 _CURVE = 1025  # points at which ramps and curves are known
-# Means over directions from which diffuse light comes: of Fresnel's fraction for 1.45, of the angle's cosine taken
-# from 1; and over instances or islands.
+# Means over directions of diffuse light, of Fresnel's fraction for 1.45 and 1 less the cosine; and over instances.
 _MEANS = {(kind, "Random"): 0.5 for kind in ('OBJECT_INFO', 'PARTICLE_INFO', 'HAIR_INFO')}
 _MEANS |= {('FRESNEL', "Fac"): 0.09, ('LAYER_WEIGHT', "Fresnel"): 0.09, ('LAYER_WEIGHT', "Facing"): 0.33}
 _MEANS |= {('NEW_GEOMETRY', "Backfacing"): 0.5, ('NEW_GEOMETRY', "Random Per Island"): 0.5}

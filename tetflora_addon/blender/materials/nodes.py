@@ -71,9 +71,8 @@ def get_or_create(
     Returns
     -------
     bpy.types.ID
-        What an artist edited or put there under this name comes back untouched. An outdated datablock of ours gets
-        another name, because somebody may have edited it, and is the artist's from then on; one that is linked from
-        another file keeps its name.
+        What an artist edited or put there under this name comes back untouched. An outdated datablock of ours, which
+        may be edited, gets another name and is the artist's; a linked one keeps its own.
     """
     found = collection.get((name, None)) or collection.get(name)
     if found is not None:
@@ -141,8 +140,7 @@ class Term:
 class Graph:
     """A node tree under construction.
 
-    Sockets are found by identifier or, for the sockets of groups, by name: identifiers stayed the same where 5.x
-    renamed "Fac" to "Factor".
+    Sockets are found by identifier or, of groups, by name: identifiers stayed where 5.x renamed "Fac" to "Factor".
 
     Parameters
     ----------

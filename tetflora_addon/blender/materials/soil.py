@@ -1,10 +1,8 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Soil by nodes, in the colors of what lies and grows on it: a map of them over the ground, and noise for all that is
-finer than its cells.
+"""Soil by nodes, in the colors of what lies and grows on it: a map of them, and noise for what is finer than its cells.
 
-The map is an image that is packed into the file. It is laid on the ground from above by world coordinates, so that it
-fits meshes of any resolution, with or without UV maps.
+The map is an image, packed into the file. It is laid on the ground from above by world coordinates, without UV maps.
 """
 
 from collections.abc import Sequence

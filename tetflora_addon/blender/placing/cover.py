@@ -96,8 +96,7 @@ def cover_steps(
 ) -> Job[CoverResult]:
     """Cover the ground of a population.
 
-    What an earlier run made for the same population is replaced; settings that were changed since stay. Closing the
-    steps leaves everything as it was.
+    Replaces what an earlier run made for the same population; settings changed since stay. Closing it changes nothing.
 
     Parameters
     ----------
@@ -292,8 +291,7 @@ def _strata(
 def strew_steps(data: JobData, population: bpy.types.PropertyGroup) -> Job[populations.PlacedPlants | None]:
     """Strew the leaves that fall in autumn under a population; None where nothing above sheds its leaves.
 
-    What an earlier run made for the same population is replaced; settings that were changed since stay. Closing the
-    steps leaves everything as it was.
+    Replaces what an earlier run made for the same population; settings changed since stay. Closing it changes nothing.
 
     Raises
     ------

@@ -2,8 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The first forest: rolling ground, some ninety plants, a camera, the sun and a sky, with plain node trees.
 
-An empty scene, or one as Blender starts with, is used and nothing in it is removed. Otherwise the forest gets a new
-scene.
+An empty scene, or one as Blender starts with, is used and nothing in it is removed. Else the forest gets a new scene.
 """
 
 from dataclasses import dataclass
@@ -59,8 +58,7 @@ def tread(material: bpy.types.Material) -> None:
 def sky(name: str) -> bpy.types.World:
     """Blue above, pale at the horizon.
 
-    What it sheds on the ground has the color of daylight of 15,000 K, as under a clear sky, and a quarter of the sun's
-    strength: shade is cool, not blue-black.
+    What it sheds on the ground has the color of a clear sky, 15,000 K, and a quarter of the sun's strength.
     """
     world = bpy.data.worlds.new(name)
     graph = Graph(shader_tree(world))

@@ -179,8 +179,7 @@ def _set_at_once(objects: Sequence[bpy.types.Object], rows: Sequence[np.ndarray]
 def _numbered(names: Sequence[str], kinds: np.ndarray) -> list[str]:
     """Name of each new plant, by its kind.
 
-    Blender finds numbers for equal names by itself, and is slow at it: 30,000 plants of one name take twice as long as
-    with numbers beyond all that are there.
+    Blender finds numbers for equal names by itself, and is slow at it: 30,000 plants of one name take twice as long.
     """
     if len(kinds) < _FEW:
         return [names[kind] for kind in kinds.tolist()]
@@ -324,8 +323,7 @@ def note_field(scene: bpy.types.Scene, field: bpy.types.Object) -> None:
 def prepare_scene(scene: bpy.types.Scene) -> None:
     """Settings that a scene with plants needs.
 
-    Refinement changes the scene while it renders; with Blender's interface unlocked, the window would draw the same
-    data at that time and could crash.
+    Refinement changes the scene while it renders; a window that is not locked would draw that data and could crash.
     """
     scene.render.use_lock_interface = True
     scene.tetflora.version = VERSION

@@ -3,8 +3,7 @@
 """Populations of a scene: plants that were placed together, and can be placed again by the stored rules.
 
 A plant or field stores the identity of its population and its number in it, so names and places in lists do not matter.
-A copy made by hand has the number of its original: the oldest with a number belongs to the population, the others are
-the artist's.
+A copy made by hand has its original's number: the oldest with a number is the population's, the others the artist's.
 """
 
 import uuid
@@ -97,8 +96,7 @@ def own_number(objects: Iterable[bpy.types.Object]) -> int:
 def make_plants_steps(data: JobData, population: TetFloraLayer, later: Collection[str] = ()) -> Job[PlacedPlants]:
     """Place a population's plants by its settings, in place of those that it has.
 
-    Closing the steps, or an error, leaves the scene as it was. Plants of populations that are planted later, of which
-    the identities are given, keep nobody away.
+    Closing it, or an error, changes nothing. Plants of populations that are planted later keep nobody away.
 
     Raises
     ------
@@ -312,7 +310,8 @@ def _dissolve(scene: bpy.types.Scene, collection: bpy.types.Collection | None) -
 
 
 def free_name(group: Iterable[bpy.types.PropertyGroup], name: str) -> str:
-    """A name, with a number as Blender's where another of the group has it."""
-    taken = {one.name for one in group if one.name}
-    numbered = (f"{name}.{i:03d}" for i in range(1, len(taken) + 2))
+    """A name, with a number as Blender's where another of the group has it, in place of the number that it has."""
+    taken, (stem, dot, end) = {one.name for one in group if one.name}, name.rpartition(".")
+    stem = stem if dot and end.isdecimal() else name
+    numbered = (f"{stem}.{i:03d}" for i in range(1, len(taken) + 2))
     return name if name not in taken else next(n for n in numbered if n not in taken)

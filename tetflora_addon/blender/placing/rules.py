@@ -2,8 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """From the settings of a population to places for its plants: rules for the engine, grounds, and what stands there.
 
-Places where the brush has erased plants stay bare. The population stores them as JSON text: a list for each stroke, of
-a radius and the x and y of the centers of its circles.
+Places where the brush has erased plants stay bare. The population has them as JSON: of each stroke radius and centers.
 
 Each biome takes a part of its ground, its zone. Biomes with limits or a mask come first, in the order of the list;
 those without take what is left. So a riparian wood that is added to a beech forest pushes it back from the water.

@@ -132,8 +132,7 @@ def read_ground(
     vertex_group : str
         Group whose weights define how suitable the ground is; every mesh needs it, or a float attribute of its name.
     image : bpy.types.Image, optional
-        Its luminance, as stored, defines how suitable the ground is: 50 % gray halves the number of plants. Alpha does
-        not count.
+        Its luminance, as stored, defines how suitable the ground is: 50 % gray halves the plants. Alpha does not count.
     uv_layer : str
         UV map for the image; the one that renders if empty.
     invert_group, invert_image : bool

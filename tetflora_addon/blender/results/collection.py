@@ -35,8 +35,7 @@ _Made = TypeVar("_Made", bound=bpy.types.ID)
 class Results:
     """A result collection under construction, which is in no scene until it is finished.
 
-    So nobody sees anything twice. A first look is finished, and what is made after it takes its place tile by tile.
-    `discard` removes all that has no place yet.
+    So nobody sees anything twice. A first look gives way tile by tile. `discard` removes all that has no place yet.
 
     Parameters
     ----------

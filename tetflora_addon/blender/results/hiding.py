@@ -2,13 +2,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Objects that results replace: hidden while there are results, and shown again as they were.
 
-Their earlier visibility is stored in custom properties, so that it survives saving, renaming, and deleting results by
-hand. An object can be hidden for several scenes: it is shown when the last of them has no results any more.
+Their visibility is stored in custom properties, which outlive saving. One hidden for several scenes waits for the last.
 
-Switches of what is linked belong to the library, and those that are animated are set again in each frame. What belongs
-to this file is which collections hold such an object: it is taken out of collections of this file, and collections of
-the library are excluded from the view layers. What else these hold is shown by a collection of this file meanwhile. The
-scene remembers all of it in a custom property.
+Switches of what is linked are the library's, and those that are animated are set in each frame. Such an object is taken
+out of collections of this file, and collections of the library are excluded; what else these hold, another shows
+meanwhile. The scene remembers all of it in a custom property.
 """
 
 import json
@@ -335,8 +333,7 @@ def lift_marks() -> dict[tuple, str | list]:
     Returns
     -------
     dict
-        The marks by purpose and name of the object, and linked objects by purpose, name of the scene and None, for
-        `restore_marks`.
+        Marks by purpose and object, and linked objects by purpose, name of the scene and None, for `restore_marks`.
     """
     lifted = {}
     for scene, purpose in list(scenes_hiding()):

@@ -57,8 +57,7 @@ def write_mesh(name: str, buffers: MeshBuffers, materials: Sequence[bpy.types.Ma
     Raises
     ------
     ValueError
-        Arrays of wrong shape or type, or indices out of range, with which Blender would crash later; no datablock is
-        left behind.
+        Arrays of wrong shape or type, or indices out of range, which crash Blender later; no datablock is left.
     """
     return run_to_end(mesh_steps(name, buffers, materials))
 

@@ -184,8 +184,7 @@ def release_materials() -> None:
 def result_collections(scene: bpy.types.Scene, purpose: str | None = None) -> list[bpy.types.Collection]:
     """Result collections of a scene and this file, of one purpose or of all, wherever the artist has moved them.
 
-    One that was renamed still is: only where another one of the scene bears the name under which it was made, or shares
-    its objects, it is a copy of that.
+    One that was renamed still is: it is a copy only where another of the scene has its first name, or shares objects.
     """
     inside = scene.collection.children_recursive
 

@@ -157,8 +157,7 @@ def _panorama(data: bpy.types.Camera, width: int, height: int) -> tuple[tuple[fl
 def _lens(data: bpy.types.Camera, matrix: Floats, depsgraph: bpy.types.Depsgraph) -> tuple[float, float]:
     """Radius of the aperture and distance of focus, meters; a radius of 0 without depth of field.
 
-    The lens's diameter is its focal length over the f-stop; Cycles takes 1 m for the focal length of an orthographic
-    camera.
+    The lens's diameter is its focal length over the f-stop; for Cycles, that of an orthographic camera is 1 m.
     """
     dof = data.dof
     if not dof.use_dof or dof.aperture_fstop <= 0.0:

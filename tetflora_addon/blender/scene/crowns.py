@@ -2,8 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Mean crowns of the species of a scene: at once for what is made of them, in the background for panels.
 
-A species is compiled for its crown once in a session, which takes up to a tenth of a second. A panel that is drawn
-must not wait for that.
+A species is compiled for its crown once in a session, in up to a tenth of a second. A panel must not wait for that.
 """
 
 from collections.abc import Callable, Iterable

@@ -44,8 +44,7 @@ def read_explicit(depsgraph: bpy.types.Depsgraph) -> Explicit | None:
     Raises
     ------
     SceneError
-        A marked object without faces, or with numbers that are none, or one that is linked and cannot be hidden; the
-        message names it.
+        A marked object without faces, with invalid numbers, or linked and not to be hidden; the message names it.
     """
     if not any(o.tetflora.is_explicit for o in bpy.data.objects):
         return None

@@ -321,7 +321,9 @@ def year_now(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> float:
 
 
 def stand_years(scene: bpy.types.Scene) -> list[float]:
-    """Present years of all histories of a scene."""
+    """Present years of all histories of a scene; at little cost where the file has none, whatever objects there are."""
+    if not any(YEAR in data.attributes for data in (*bpy.data.meshes, *bpy.data.pointclouds)):
+        return []
     meshes = (obj for obj in scene.objects if isinstance(obj.data, Points))
     return [group.stand_year for obj in meshes if (group := obj.tetflora).is_field and has_history(obj)]
 
@@ -390,8 +392,7 @@ def in_year(
 ) -> tuple[FieldPoints, Sizes | None]:
     """The plants that are there in a year, between their records.
 
-    Positions and sizes go evenly from one record to the next. A trunk that falls between two records stands until the
-    second.
+    Positions and sizes go evenly from record to record. A trunk that falls between two records stands until the second.
     """
     a, b, part = records.chosen(now)
     scale = points.scale[:, a] + part * (points.scale[:, b] - points.scale[:, a])
@@ -636,8 +637,7 @@ def write_field(
 ) -> bpy.types.Object:
     """Make a field: an object with a mesh of vertices, not linked to any collection yet.
 
-    A mesh rather than a point cloud: its vertices are dots in the viewport and invisible in renders, and every version
-    of Blender can make it.
+    A mesh, no point cloud: its vertices are dots in viewports, not seen in renders, and every Blender can make it.
 
     Parameters
     ----------

@@ -2,8 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What results take over from the objects that they stand for: who sees them, what lights them, their passes.
 
-A look is that as JSON, which settles what of several objects may become one result; it is empty where an object and its
-collections are as new ones are.
+A look is that as JSON, which settles what of several objects may become one result; empty for what new objects have.
 """
 
 import json

@@ -2,11 +2,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Objects of a scene that take part in refinement, by view layer; instances of plants; triangles of occluders.
 
-Blender lists instances one by one (``Depsgraph.object_instances``). Here each object that is instanced is visited once,
-and all of its places are computed at once as arrays, so that a million instances take little time.
+Blender lists instances one by one. Here each object that is instanced is visited once, its places as arrays.
 
-Instances of some objects are refined as assets: of those that are marked, and of dropped collections that are species.
-The mark is a property of the object. Objects that are linked cannot keep one, so the scene has a list of those.
+Instances of marked objects and of dropped species are refined as assets. The scene lists those marked that are linked.
 """
 
 from collections.abc import Callable, Collection, Iterator, Sequence
@@ -136,8 +134,7 @@ _OCCLUDER_REMEDY = (
 def view_layer_groups(scene: bpy.types.Scene) -> list[list[bpy.types.ViewLayer]]:
     """Rendered view layers with something to refine, together where it is the same; at least one group.
 
-    Layers that render the same plants in the same way share a refinement; each gets one where it has plants of its own,
-    or has them as a holdout.
+    Layers that render the same plants alike share a refinement; one with others, or a holdout of them, has its own.
     """
     layers = [layer for layer in scene.view_layers if layer.use] or list(scene.view_layers)
     if len(layers) == 1:
@@ -241,8 +238,7 @@ def may_scatter(obj: bpy.types.Object) -> bool:
 def objects_within(collection: bpy.types.Collection) -> list[bpy.types.Object]:
     """Objects of a collection and of those within it, each once.
 
-    ``Collection.all_objects`` fills a cache that Blender 4.5 to 5.2 leaves stale at undo; the next undo, or reading it,
-    may then crash.
+    ``Collection.all_objects`` fills a cache that Blender 4.5 to 5.2 leaves stale at undo: reading it may then crash.
     """
     homes = [collection, *collection.children_recursive]
     return list(dict.fromkeys(obj for home in homes for obj in home.objects))

@@ -59,12 +59,10 @@ def read_plants(
 ) -> tuple[Seeds, tuple[tuple[str, int], ...], str]:
     """Enabled plants of a view layer that render: single ones by name, then instances, then fields.
 
-    Plants and fields that collections or geometry nodes instance take part; each instance becomes an individual of its
-    own.
+    Plants and fields that collections or geometry nodes instance take part; each instance is an individual of its own.
 
     A plant has the direction of its z axis, the azimuth of its x axis, and the mean of its absolute scales: plants are
-    neither stretched nor mirrored. With motion blur they are where they are in the middle of the exposure, and have
-    their motion.
+    neither stretched nor mirrored. With motion blur they are where they are amid the exposure, and have their motion.
 
     Returns
     -------
@@ -79,8 +77,7 @@ def read_plants(
     NoPlantsError
         No plant is left; the message says how to get some.
     SceneError
-        No plant is of a species that the catalog has, or one has a scale of 0, or a transform that is not a number;
-        the message names the objects.
+        No plant is of a known species, or one has a scale of 0 or an invalid transform; the message names them.
     """
     read = partial(_read_plants, scene, depsgraph)
     movers = scene.render.use_motion_blur and [o for o in bpy.data.objects if may_take_part(o) and moves(o)]

@@ -38,8 +38,7 @@ def read_skeleton(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> skel
     Returns
     -------
     Skeleton
-        About the object's origin, in meters, z up: with its scale and tilt, without its position and its turn about
-        the vertical, which are the plant's.
+        About the object's origin, in meters, z up: with its scale and tilt; position and turn are the plant's.
 
     Raises
     ------

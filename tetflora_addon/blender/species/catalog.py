@@ -151,8 +151,7 @@ def default_species() -> str:
 class SpeciesChoice:
     """A stored identifier, and an enumeration over it for panels.
 
-    The identifier is a string, so that a species whose file is missing survives; the enumeration only reads and
-    writes it.
+    The identifier is a string, so that a species without its file survives; the enumeration only reads and writes it.
     """
 
     #: Whether the enumeration has assets.

@@ -73,8 +73,7 @@ class TetFloraSpeciesEdit(bpy.types.PropertyGroup):
 def listed() -> dict[str, FileInfo]:
     """Species that files hold, edits aside.
 
-    A panel asks for them hundreds of times while it is drawn, so in the window folders are looked at every `_TRUSTED`
-    seconds only, and when TetFlora itself has changed a file.
+    A panel asks often: in the window folders are looked at every `_TRUSTED` seconds, and when a file was changed.
     """
     global _seen, _seen_at, _odd
     now = time.monotonic()

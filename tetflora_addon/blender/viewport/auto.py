@@ -4,9 +4,8 @@
 
 A change stops the work, which starts again after `QUIET` seconds without changes. Where the digest of everything that
 refinement depends on is the same as last time, nothing is done. Earlier results stay until there are new ones, but not
-through undo. Undo, loading, rendering, and operators that change results stop the work too, because it holds datablocks
-that they remove. Blender tells nobody when a viewport is turned or shaded otherwise, so it is looked at: while one
-shows plants in *Rendered* shading it is on by itself, for that view, unless the artist switches it off there.
+through undo. What removes datablocks stops the work. Blender tells nobody when a viewport is turned or shaded
+otherwise: while one shows plants in *Rendered* shading it is on by itself.
 
 What was not seen is coarse, which shows from another side. So results go as soon as the view is no longer `alike`, and
 simple shapes stand for them until there is a first look; else they stay until all is sharp, without a first look.
@@ -29,9 +28,10 @@ from ...jobs import Job, Pace
 from ...refinement.loop import Statistics
 from ..job import refine
 from ..job.frame_cache import choices, scene_digest
+from ..job.stored_contents import stored_contents
 from ..main_thread import in_main_thread
 from ..materials.nodes import is_ours, is_own
-from ..placing.plant_objects import plants_of, prepare_scene
+from ..placing.plant_objects import prepare_scene
 from ..properties import auto_refine_switched
 from ..results.collection import has_results
 from ..results.hiding import remove_results
@@ -39,8 +39,7 @@ from ..results.leaf_objects import leaf_objects
 from ..results.output import PURPOSE, remove_collection, result_collections
 from ..runtime import GoneError, Outlook, Part, call_off, call_soon, handlers, in_order, listening, redraw, with_uid
 from ..scene.camera import is_rendered, view_camera, viewport_of, viewports
-from ..scene.fields import fields_of, stand_years
-from ..scene.looks import shown_objects
+from ..scene.fields import stand_years
 from ..settings import season_of, wind_of, years_of
 from .state import camera_now, find
 
@@ -293,27 +292,23 @@ def _view_layer(scene: bpy.types.Scene) -> bpy.types.ViewLayer:
     return shown or scene.view_layers[0]
 
 
-def _plants(_scene: bpy.types.Scene, layer: bpy.types.ViewLayer) -> object:
-    """Which plants and fields there are, and who sees them."""
-    seen, every = {o.name_full for o in shown_objects(layer)}, layer.objects
-    return sorted((name := o.name_full, name in seen, o.hide_render) for o in (*plants_of(every), *fields_of(every)))
+_outlook = Outlook(lambda scene, layer: stored_contents(scene, layer) if has_results(scene) else None)
 
 
-_outlook = Outlook(lambda scene, layer: _plants(scene, layer) if has_results(scene) else None)
-
-
-def results_made_for(scene: bpy.types.Scene, ask: Callable = _plants) -> dict[str, str]:
-    """What decides on results and is cheap to ask, as texts that differ, by what to call it; None is not known."""
+def results_made_for(scene: bpy.types.Scene, ask: Callable = stored_contents) -> dict[str, str]:
+    """What decides on results and is cheap to ask, as texts that differ, by what to call it; some may not be known."""
     *settings, wind, season, years, disc = choices(scene)
+    grown = [one.field.tetflora.stand_year for one in scene.tetflora.layers if one.field]
     parts = {
         "the camera": camera_now(scene),
-        "the day or year": (season, years, stand_years(scene)),
+        "the day or year": (season, years, grown),
         "the wind": wind,
         "settings": (settings, disc),
         "the layers": [(one.uid, one.made, one.placed_by, one.shown) for one in scene.tetflora.layers],
-        "the plants": ask(scene, _view_layer(scene)),
+        "the species": [(one.identifier, one.text) for one in scene.tetflora.species_edits],
     }
-    return {k: blake2b(repr(part).encode(), digest_size=8).hexdigest() for k, part in parts.items() if part is not None}
+    texts = {name: blake2b(repr(part).encode(), digest_size=8).hexdigest() for name, part in parts.items()}
+    return texts | (ask(scene, _view_layer(scene)) or {})
 
 
 def note_results(scene: bpy.types.Scene, made_for: dict[str, str]) -> None:
@@ -413,7 +408,7 @@ def before_save(*_arguments: object) -> None:
 
 _HANDLERS = handlers(
     depsgraph_update_post=on_change,
-    frame_change_post=on_frame,
+    frame_change_post=(on_frame, lambda *_: _outlook.ask()),
     undo_pre=before_undo,
     redo_pre=before_undo,
     undo_post=after_undo,

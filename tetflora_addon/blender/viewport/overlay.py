@@ -2,8 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Draw previews over 3D viewports: plants, tetrahedra, the frozen camera, figures. Nothing is drawn without a window.
 
-Batches that do not depend on the view are made once and kept. Translucent tetrahedra are made again when the view
-changes, as many as the last view could draw in a moment.
+Batches that do not depend on the view are kept. Translucent tetrahedra are as many as the last view drew in time.
 """
 
 import sys
@@ -130,9 +129,7 @@ def _standing(crowns: CrownPoints) -> gpu.types.GPUVertBuf:
 
 @cache
 def _crown_shader() -> gpu.types.GPUShader:
-    """A point as high as its plant, and within it the outline of trunk and crown: from the side that of `light_plants`,
-    the rounder the more one looks from above.
-    """
+    """A point as high as its plant, with the outline of trunk and crown as in `light_plants`, or rounder from above."""
     passed = gpu.types.GPUStageInterfaceInfo("crown_interface")
     for kind, name in (('VEC3', "color"), ('VEC4', "shape"), ('FLOAT', "low"), ('FLOAT', "pixels")):
         passed.flat(kind, name)

@@ -2,8 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What is drawn on the ground: dots where a population's plants would stand, and the lines of a tool's cursor.
 
-Dots belong to the session and are forgotten when a file is loaded. The state holds names and arrays, because references
-do not outlive undo.
+Dots belong to the session and are forgotten when a file is loaded. The state holds no references: undo ends these.
 """
 
 from collections.abc import Sequence
