@@ -40,7 +40,7 @@ from .contents import (
 from .decisions import Decision, Terminals, decide, gains_nothing, without_splits
 from .lights import Light, decide_by_shadows, seen_ground, shadows_of
 from .polygons import Polygons
-from .settings import RefinementSettings
+from .settings import QUALITIES, RefinementSettings
 from .shared_parts import PlacedAssets, SharedAssets, SharedParts, SharedPlants
 from .visibility import AlphaBuffer, Buffers, is_anchored, pixels_of_buffer, widened_for
 
@@ -325,6 +325,8 @@ def refine(
     filled = bool(np.isfinite(settings.proxy_block))
     plants, assets = SharedPlants(flora, seeds, camera, filled), SharedAssets(placed, camera, filled)
     settings = _on_day(settings, flora, plants.parts.branches)
+    pixels = int(max(camera.width, camera.height, QUALITIES["FINAL"]["visibility_resolution"]))  # finer is of no use
+    settings = replace(settings, visibility_resolution=min(settings.visibility_resolution, pixels))
     camera = widened_for(camera, settings.margin, flora, plants.parts.branches, polygons, assets.parts)
     slack = _slack(camera, settings.visibility_resolution)
     own = in_the_root(polygons, large_polygons(polygons, camera))
