@@ -87,9 +87,8 @@ def draw_message(
 
     ``width`` is that of a popover at a scale of 1; that of the region if not given.
     """
-    letters = (
-        width / 7.0 if width else context.region.width / (7.0 * (context.preferences.system.ui_scale or 1.0))
-    )  # 0 without a window
+    scale = context.preferences.system.ui_scale or 1.0  # 0 without a window
+    letters = (width or context.region.width / scale) / 7.0
     column = layout.column(align=True)
     for n, line in enumerate(wrap(text, max(int(letters) - 4, 16))):
         column.label(text=line, icon='BLANK1' if n else icon)

@@ -3,7 +3,7 @@
 """Structures of arrays: many things of one kind, with one array for each of their properties.
 
 Vectors are (n, 3) and frames (n, 3, 3), but memory holds one component of all n after the other. Arithmetic on such
-arrays runs along n without strides, and its results keep the layout. Indexing and stacking do by the functions below.
+arrays runs along n without strides, and its results keep the layout; in indexing and stacking the functions below do.
 
 Where things come and go in small steps, what that costs goes with what changes, not with what is there: `Growing` has
 room to spare and is changed in place, for few columns. `Chunks` only collects, for many.
@@ -79,7 +79,7 @@ def smoothstep(x: Floats, low: float = 0.0, high: float = 1.0) -> Floats:
 class Arrays:
     """Base of dataclasses whose fields are columns: one row for each of n things.
 
-    A column is an array, or an `Arrays` of that length. One whose default is None may be absent. Others stay.
+    A column is an array, or an `Arrays` of the same length; absent where its default is None. Other fields are kept.
     """
 
     def __getstate__(self) -> dict[str, Any]:

@@ -186,7 +186,7 @@ def write_arrays(path: Path, names: re.Pattern[str], most: int, **arrays: NDArra
 def make_room(folder: Path | None, names: re.Pattern[str], most: int) -> None:
     """Delete this user's files of some names in a folder, longest unused first, down to ``most`` bytes; and left-overs.
 
-    Any of them may be gone already: other processes tidy up as well. What others own counts for them alone.
+    Any may be gone: other processes tidy up as well. What others own counts for them alone, or they could empty it.
     """
     now, files = time.time(), []
     for entry in islice(_entries(re.compile(f"{names.pattern}|{_BEGUN.pattern}"), folder), _MOST_ENTRIES):

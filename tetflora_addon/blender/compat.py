@@ -69,7 +69,7 @@ def disable_bump_correction(material: bpy.types.Material) -> None:
 def loses_summed_lobes() -> bool:
     """Whether Cycles loses light where lobes around several normals are added.
 
-    It counts those cut off at the face's horizon, but not their light (issue 139870); mended in 5.0, with this node.
+    It counts those cut off at the horizon, but not their light (Blender's issue 139870); mended in 5.0, with this node.
     """
     return not hasattr(bpy.types, "ShaderNodeRadialTiling")
 

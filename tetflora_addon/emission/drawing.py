@@ -348,7 +348,7 @@ class _Tile(Canvas):
     def _leave_out(self, number: float) -> None:
         """Leave out so many things, should there be more than allowed.
 
-        First go facets that nobody sees, then the smallest faces in the image, at last seen facets, all by a hash.
+        First go facets that nobody sees, then the smallest faces in the image, then seen facets; facets by a hash.
         """
         if number <= 0.0:
             return

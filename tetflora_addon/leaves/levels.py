@@ -433,7 +433,7 @@ def _longer_axis(points: Floats, weight: Floats, normal: Floats) -> NDArray:
 
 
 def _sheet(points: Floats, area: Floats) -> tuple[Floats, float, float]:
-    """Triangles as a sheet folded along its longer axis: normal (3,), sine of the fold, mean square of what is off."""
+    """Triangles as a sheet folded along its longer axis: normal (3,), sine of the fold, mean square error of normal."""
     vectors = np.cross(points[:, 1] - points[:, 0], points[:, 2] - points[:, 0]) / 2
     whole, mean = area.sum(), vectors.sum(axis=0)
     if np.linalg.norm(mean) < whole / 2:
@@ -449,7 +449,7 @@ def _sheet(points: Floats, area: Floats) -> tuple[Floats, float, float]:
 
 
 def _kite(model: LeafModel, area: float, normal: Floats, fan: tuple[Floats, Floats], fold: float = 0.0) -> Floats:
-    """Vertices (4, 3) of a kite with an area and a normal, along the model's longer axis across that; both rise."""
+    """Vertices (4, 3) of a kite with an area, a normal, and a fold by which both halves rise, along the longer axis."""
     points, weight = fan[0], fan[1] / fan[1].sum()
     middle = (weight[:, None] * points.mean(axis=1)).sum(axis=0)
     points = points - middle

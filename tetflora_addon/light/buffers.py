@@ -233,7 +233,8 @@ class LightBuffer:
     def _gathered(self, emitted: Floats) -> Floats:
         """Radiance (f, 3) in front of each fragment, by a prefix scan over (transmittance, radiance) of its pixel.
 
-        Two stretches are one: T = T₁ T₂, L = L₁ T₂ + L₂ (Hillis and Steele, "Data Parallel Algorithms", 1986).
+        Two stretches in a row are one: T = T₁ T₂, L = L₁ T₂ + L₂. Doubling their length covers all in few rounds
+        (Hillis and Steele, "Data Parallel Algorithms", 1986).
         """
         through = np.exp(-self._depth.astype(np.float64))
         light = (emitted * (1.0 - through)[:, None]).T.copy()

@@ -322,7 +322,7 @@ def shadow_steps(
     resolution : int
         Longer side of a lamp's buffer, pixels; see `light_resolution`. The sky's are `SKY_FRACTION` of it.
     sheets : SurfaceElements, optional
-        Facets and leaves as they are drawn: clumps shadow themselves, as no even cloud does. A pixel is about a sheet.
+        Facets and leaves as they are drawn: clumps shadow themselves, as no even cloud does. Pixels should match them.
     near : Near, optional
         Part of the scene that gets buffers of its own from suns.
     orders : int

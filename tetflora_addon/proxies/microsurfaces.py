@@ -3,7 +3,7 @@
 """Microsurfaces: few facets that stand for the many surfaces of what is not made explicit (paper, sections 1 and 7).
 
 Each facet takes its place, orientation and color from a leaf or branch that the compiled species expects in the
-sub-plant, or from a sample on the faces of an asset. Facets are about a pixel large; they keep area and orientation.
+sub-plant, or from a sample on the faces of an asset. Facets are about a pixel large; mean area and orientation stay.
 
 Each lies in a plane of the faces of leaves, drawn in proportion to their areas: a folded leaf shows less to the sky
 than a flat one, and a spray of needles has no plane. With leaves' own axes beeches were a quarter too bright.
@@ -167,7 +167,7 @@ def facet_sites(
 ) -> FacetSites:
     """Facets that areas (n,) are cut into, by the area (n,) of one; their expected number is area / facet.
 
-    From 1 on they divide the area evenly; below, one stands for several sub-plants. The real fraction (n,) has none.
+    From 1 on they divide the area evenly; below, one stands for several sub-plants. The real fraction (n,) gets none.
     """
     expected = area / np.maximum(facet, 1e-300)  # leafless plants have no size of leaves
     counts = np.floor(expected + uniform(key, draw)).astype(np.int64)

@@ -95,7 +95,7 @@ def tetrahedron_fragments(vertices: Floats, camera: Camera, width: int, height: 
 def occluder_depth(triangles: Floats, camera: Camera, width: int, height: int) -> Floats:
     """Where each pixel's ray first meets an opaque triangle (height · width,), meters along it; infinite for none.
 
-    Triangles (t, 3, 3) are two-sided, in meters, world space, and may cross the eye's plane; invalid ones are ignored.
+    Two-sided triangles (t, 3, 3), meters, world space, may cross the eye's plane; flat or infinite ones do not count.
     """
     nearest = np.full(width * height, np.inf)
     for start in range(0, len(triangles), PRIMITIVE_BATCH):

@@ -39,7 +39,8 @@ _ACROSS = 8.0
 def depth_in_front(pixel: Integers, depth: Floats) -> tuple[Integers, NDArray]:
     """First fragment of its pixel, and optical depth before it, for each of fragments (n,).
 
-    Fragments are sorted by ``pixel`` and front to back. Of one cumulative sum, what earlier pixels hold is subtracted.
+    Fragments are sorted by ``pixel`` and front to back. What all earlier pixels hold is subtracted again from one
+    cumulative sum; rounding must not leave less than nothing.
     """
     summed = np.cumsum(depth)
     begins = np.flatnonzero(np.diff(pixel, prepend=-1))

@@ -207,7 +207,7 @@ class _Aged:
 
     ``stem`` and ``last`` are the order of the stem, and of the twigs. By order, ``whole`` are typical lengths when
     full-grown, meters; ``now`` and ``before`` lengths over those, now and a year ago; ``stout`` radii over those when
-    full-grown. ``fresh`` is the fraction of branches with more that live for a while, ``thin`` a factor on leaves.
+    full-grown. ``fresh`` is the fraction of branches with more that live a while, ``thin`` a factor on leaf numbers.
     """
 
     def __init__(self, species: Species, ages: Ages, years: float) -> None:

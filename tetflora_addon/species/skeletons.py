@@ -395,7 +395,7 @@ def skeleton_from_edges(
     Raises
     ------
     SpeciesError
-        No edge of any length, numbers that are not finite, a negative radius, an edge to no point, or too many points.
+        No edge of any length, numbers that are not finite, a negative radius, an edge to nowhere, or over `MAX_POINTS`.
 
     Notes
     -----
@@ -523,7 +523,7 @@ def _pipe_radii(points: Floats, parent: Integers) -> Floats:
 def _base_radius(knots: Floats, radius: Floats, base: Integers, count: Integers) -> Floats:
     """Radii (s,) at the first knots ``base`` (s,) of side branches of ``count`` knots (s,); those given are the forks'.
 
-    The taper between its own first two points, continued to the fork; half of the fork's radius for a bare tip.
+    The taper between its own first two points, continued to the fork; half of the fork's radius for a lone tip of 0.
     """
     fork, here, beyond = radius[base], radius[base + 1], np.where(count > 2, base + 2, base + 1)
     run = np.linalg.norm(knots[base + 1] - knots[base], axis=1)

@@ -80,7 +80,7 @@ def face_area_vectors(vertices: Floats) -> Floats:
     Returns
     -------
     (..., 4, 3) float64
-        Vector ``i`` is of the face opposite vertex ``i``; square meters. They point inwards where it is negative.
+        Vector ``i`` is of the face opposite vertex ``i``, m²; they add up to zero, and point inwards if it is negative.
     """
     a, b, c, d = (vertices[..., i, :] for i in range(4))
     ab, ac, ad = b - a, c - a, d - a

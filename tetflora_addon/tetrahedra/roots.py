@@ -68,14 +68,15 @@ def view_root(camera: ViewingCamera, bounds: ArrayLike) -> TetrahedralTree:
     Parameters
     ----------
     camera : Camera or alike
-        Whose view it is; the window may be asymmetric, without the axis. What is before ``near`` is in the view.
+        Whose view it is; the window may be asymmetric, off the axis too. What is nearer than ``near`` is in the view.
     bounds : (2, 3) float64
         Lowest and highest corner of the world box that holds plants, polygons and lights, meters.
 
     Returns
     -------
     TetrahedralTree
-        The pyramid of a perspective view is two terminals, the box of an orthographic one six, all marked `inside`.
+        The pyramid of a perspective view is two terminals, the box of an orthographic one six. They are marked
+        `inside`, all others are not; children inherit it.
 
     Raises
     ------

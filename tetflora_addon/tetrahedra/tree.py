@@ -119,7 +119,7 @@ def best_diagonal(vertices: Floats) -> Integers:
     Returns
     -------
     (n,) intp
-        Diagonal ``k`` joins the middles of edges ``k`` and ``5 - k`` of `geometry.EDGES`; the first of equals.
+        Diagonal ``k`` joins the middles of edges ``k`` and ``5 - k`` of `geometry.EDGES`; the first of equal ones.
 
     Notes
     -----
@@ -152,7 +152,7 @@ def divide_in_eight(vertices: Floats, diagonal: Integers | None = None) -> tuple
         Cutting planes ``(nx, ny, nz, d)``, unit normals, in the order of a heap: plane ``i`` is followed by plane
         ``2 i + 1`` on side 0 and by plane ``2 i + 2`` on side 1.
     children : (n, 8, 4, 3) float64
-        Positively oriented; child ``4 s + 2 t + u`` is on sides ``s``, ``t``, ``u`` of its planes; even are corners.
+        Positively oriented; child ``4 s + 2 t + u`` on sides ``s``, ``t``, ``u`` of three planes; the even are corners.
     """
     diagonal = best_diagonal(vertices) if diagonal is None else diagonal
     middles = (vertices[:, EDGES[:, 0]] + vertices[:, EDGES[:, 1]]) / 2.0
@@ -165,7 +165,7 @@ def divide_in_eight(vertices: Floats, diagonal: Integers | None = None) -> tuple
 def divide_by_shape(vertices: Floats) -> tuple[Floats, Floats]:
     """Divide tetrahedra ``(n, 4, 3)`` into eight in the way that keeps them in better shape, so that no slivers arise.
 
-    Both ways give eight of equal volume, three planes deep. Worst qualities count, bisection with a `HANDICAP`.
+    Both ways give eight of equal volume, three planes deep. The worst quality counts, bisection's with a `HANDICAP`.
 
     Parameters
     ----------

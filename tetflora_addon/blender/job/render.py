@@ -223,10 +223,8 @@ def _tell(progress: Progress) -> None:
     """Say in the window how far plants are: Blender itself says "Rendering" and 0 % meanwhile."""
     if (now := time.monotonic()) - _rendering.told > _OFTEN:
         _rendering.told = now
-        text = (
-            f"TetFlora {progress.fraction:4.0%}   {progress.message}   |   The window is locked until the render ends"
-        )
-        later(partial(show_status, text))
+        text = f"TetFlora {progress.fraction:4.0%}   {progress.message}"
+        later(partial(show_status, f"{text}   |   The window is locked until the render ends"))
 
 
 def _learn(scene: bpy.types.Scene) -> None:

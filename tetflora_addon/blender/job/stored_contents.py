@@ -23,9 +23,8 @@ from ..scene.looks import shown_objects
 from ..scene.objects import may_take_part, objects_within
 from ..species.asset_species import asset_species
 
-_found: dict[
-    tuple[int, str], tuple[tuple[int, int], dict[str, str]]
-] = {}  # who is there, and texts, by scene and layer
+# Who is there, and texts, by scene and layer.
+_found: dict[tuple[int, str], tuple[tuple[int, int], dict[str, str]]] = {}
 
 
 def stored_contents(scene: bpy.types.Scene, layer: bpy.types.ViewLayer) -> dict[str, str]:

@@ -2,7 +2,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Objects that results replace: hidden while there are results, and shown again as they were.
 
-Their visibility is stored in custom properties, which outlive saving. One hidden for several scenes waits for the last.
+Their earlier visibility is stored in custom properties, so that it survives saving, renaming, and deleting results by
+hand. An object can be hidden for several scenes: it is shown when the last of them has no results any more.
 
 Switches of what is linked are the library's, and those that are animated are set in each frame. Such an object is taken
 out of collections of this file, and collections of the library are excluded; what else these hold, another shows

@@ -58,7 +58,7 @@ def add_instances(
     source : bpy.types.Object or bpy.types.Collection
         The artist's own, or what `carrier_of` returned. Visible or not, in the scene or not, of this file or not.
     matrices : (n, 4, 4) float64
-        Affine maps from the source's space, relative to ``results.origin``; a collection's begins at its offset.
+        Affine maps from the source's space (a collection's begins at its offset), meters from ``results.origin``.
     ids : (n,) int32
         Become the instances' ``id``, which random values of materials follow.
     like : bpy.types.Object, optional
