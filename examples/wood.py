@@ -195,7 +195,7 @@ def render_dolly(path: Path, size: tuple[int, int] = SIZE, samples: int = SAMPLE
         for distance in DISTANCES:
             # A lens that shows the whole oak at 16 m, and a leaf at a hand's width.
             aim(scene, leaf, leaf + Vector(TOWARD * distance), 40.0)
-            cells.append((Path(folder) / f"{len(cells)}.png", f"{distance:.2g} m"))
+            cells.append((Path(folder) / f"{len(cells)}.png", f"{float(f'{distance:.2g}'):g} m"))
             render(cells[-1][0], size, samples, gray=_WIDE if distance > NEAR else _CLOSER)
         save_sheet(cells, 4, path, _CELL)
 
