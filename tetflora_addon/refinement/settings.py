@@ -44,7 +44,7 @@ class RefinementSettings:
     #: Fraction of the image's width and height by which the view is widened on each side: leaves that grow outside but
     #: reach in are real leaves.
     margin: float = 0.04
-    #: Longer side, in pixels, of the buffer that determines what hides what; time grows with the square.
+    #: Longer side of the buffer that says what is hidden, pixels; at most the image's or 256. Time grows by its square.
     visibility_resolution: int = script_setting(256, min=16, max=4096)
     #: Refinement stops before exceeding so many, which bounds time and memory.
     max_tetrahedra: int = script_setting(400_000, min=100)
