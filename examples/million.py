@@ -36,7 +36,7 @@ from .seasons import Look, sky
 from .terrain import Terrain
 from .wood import grid
 
-PLANTS, WIDTH, MEMORY = 1_000_000, 1600, 6.0
+PLANTS, WIDTH, MEMORY = 1_000_000, 1600, 15.0
 #: Relative numbers of species in the valleys and on the heights.
 VALLEYS = {"broadleaf_tree": 0.3, "oak": 0.1, "maple": 0.15, "birch": 0.1, "aspen": 0.1, "bush": 0.25}
 HEIGHTS = {"spruce": 0.45, "conifer": 0.3, "birch": 0.1, "bush": 0.15}
