@@ -405,8 +405,7 @@ class TETFLORA_OT_ground_cover(_InParts, Operator, label="Ground Cover", needs=(
 class TETFLORA_OT_grow_stand(ModalJob, Operator, label="Grow Stand", needs=(in_object_mode, ground_found)):
     """Grow a wood on the selected meshes, year by year: plants compete for light, die, fall and come up from seed.
 
-    The result is one field of plants with its whole history. Change the settings of its years, species and site, then
-    use Update.
+    The result is one field of plants with its whole history. Change its years, species and site, then use Update.
     """
 
     def steps(self, context: bpy.types.Context) -> Job[growing.GrownStand]:

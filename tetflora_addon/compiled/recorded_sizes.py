@@ -68,8 +68,7 @@ class Lives:
 class Sizes(Arrays):
     """Sizes of plants (n,), meters in the field's space; 0 is not known."""
 
-    #: height, diameter, width, base: (n,): Of the plant, of its trunk at 1.3 m, mean width of its crown, height of its
-    #: lowest limb
+    #: height, diameter, width, base: (n,): Of the plant, its trunk at 1.3 m, its crown on average, its lowest limb
     height: Floats
     diameter: Floats
     width: Floats

@@ -34,8 +34,7 @@ _SMALL = 4096  # bytes of world files and files with the name of a coordinate sy
 class Raster:
     """Cells with one value each."""
 
-    #: (h, w): meters, the first row is the first of the file (the northernmost, if ``down`` is); nan where nothing is
-    #: known.
+    #: (h, w): meters, the first row is the file's first (the northernmost, if ``down`` is); nan where none is known.
     values: Floats32
     corner: Floats  # (2,): coordinates of the middle of the first cell of the first row
     #: along and down, (2,): steps from a cell to the next of its row, and to the next row.

@@ -302,8 +302,7 @@ class DrawnLines:
     segments: Integers  # (b,)
     knots: Floats  # (b, MAX_SEGMENTS + 1, 3): evenly spaced along the branch; beyond its segments the last one again
     radii: Floats  # (b, MAX_SEGMENTS + 1)
-    #: (b, MAX_SEGMENTS, 3, 3): columns are local axes; the third leads along the segment, the others are carried along
-    #: without twist.
+    #: (b, MAX_SEGMENTS, 3, 3): columns are local axes; the third is the segment's, the others go along untwisted.
     frames: Floats
     #: length, radius and outward, (b,): of the whole line; at its base; and where between inside and outside of the
     #: crown it leaves its limb.

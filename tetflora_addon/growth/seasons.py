@@ -190,8 +190,7 @@ class Stages(Arrays):
 
     there: Mask  # (n,): not yet to come and not fallen
     size: Floats  # (n,): over that in summer
-    #: fresh, turned and dead, (n,): how far each has the fresh color, then its color of autumn, and that of dead
-    #: leaves.
+    #: fresh, turned and dead, (n,): how far each has the fresh color, that of autumn, and that of dead leaves.
     fresh: Floats
     turned: Floats
     dead: Floats

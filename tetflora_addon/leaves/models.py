@@ -264,8 +264,7 @@ LEAF_MODELS = {
 """The built-in leaves by name: as species files have leaves, polygons and the outline that they stand for."""
 
 
-#: Angle of all faces around a vertex below which it is a point, and stays: a full turn on flat ground, 4/3 π on an
-#: octahedron.
+#: Angle of all faces around a vertex below which it is a point, and stays: 2 π on flat ground, 4/3 π on an octahedron.
 _POINTED = np.pi
 
 

@@ -155,8 +155,7 @@ def fallen_on(sheet: Sheet, canopy: Canopy, kinds: int) -> Generator[float, None
 Suits = Callable[[Floats], Floats]
 
 _PATCHES = 2**34  # keys of patches, away from those of plants and clumps
-#: Fallen leaves that cover ground as far as it is covered at all, m² on a square meter; wood lies where they do, but is
-#: spread wider.
+#: Fallen leaves that cover ground as far as it ever is, m² on a square meter; wood lies there too, but spread wider.
 _LEAVES, _WOOD = 1.2, 3.0
 #: Fraction of low plants that dense litter smothers.
 _SMOTHERED = 0.45

@@ -247,8 +247,7 @@ class Projected:
     corners: Floats
     opacity: Floats  # (n,): of the thick point: 1 − e^(−κ · thickness)
     thickness: Floats  # (n,): along that ray, meters
-    #: (m, 3): corners of triangles, counted through all tetrahedra (five each); those of one follow one another. They
-    #: face either way.
+    #: (m, 3): corners of triangles that face either way, through all tetrahedra (five each), one after another.
     triangles: Integers32
 
 

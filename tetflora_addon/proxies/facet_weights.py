@@ -429,8 +429,7 @@ SHARES = (1.0, 0.4, 0.1, 0.0)
 #: Leaves over those with which plants were measured, up to which the inverse of weights goes on in a line.
 DENSEST = 4.0
 #: Power of how dense a narrow crown is with which its limbs are. With .5, refined oak woods are a fifth too dark inside
-#: (``python -m benchmarks light_inside``); with 1, limbs of beeches let up to a third more through than
-#: their leaves.
+#: (``python -m benchmarks light_inside``); with 1, limbs of beeches let up to a third more through than their leaves.
 _IN_LIMBS = 0.75
 #: Ages of which weights are measured: fractions of the full one, of the lifespan, and years after death.
 _YOUNG, _OLD, _DEAD = (0.04, 0.1, 0.25, 0.5), (0.9, 0.995), (1.0, 8.0, 30.0)

@@ -82,8 +82,7 @@ class NodeLaw(NamedTuple):
     begin: ArrayLike
     end: ArrayLike
     power: ArrayLike  # (...): the number of nodes below grows as this power of the length
-    #: whole and below, (...): number of nodes from ``begin`` to ``end`` (and on, as densely), and from the foot to
-    #: ``begin``.
+    #: whole and below, (...): nodes from ``begin`` to ``end`` (and on, as densely), and from the foot to ``begin``.
     whole: ArrayLike
     below: ArrayLike
 

@@ -44,8 +44,7 @@ class StandSite:
     plantable: NDArray | None = None
     moisture: NDArray | None = None  # (h, w): 0 dry to 1 wet; 0.5, fresh, where it is None
     fertility: NDArray | None = None  # (h, w): 0 poor to 1 rich; 0.7 where it is None
-    #: Sum of daily mean temperatures over 5 °C in a year (growing degree days), at the height 0; it is colder above by
-    #: 0.6 K for 100 m.
+    #: Sum of daily mean temperatures over 5 °C in a year (growing degree days), at height 0; 0.6 K colder each 100 m.
     degree_days: float = 1700.0
     coldest_month: float = -1.0  # mean temperature of the coldest month there, °C
 

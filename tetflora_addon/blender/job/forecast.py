@@ -62,8 +62,7 @@ def forecast(scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer) -> Estimat
     used = (memory.resident() or 0) + picture_bytes(scene, camera)
     processes = pool.number(memory.limit(most_memory(scene)))
     allowed = memory_left(scene, camera)
-    everything = scene.tetflora.expand_everything
-    return estimate(_stand, camera, settings_from(scene), used, allowed, everything, processes)
+    return estimate(_stand, camera, settings_from(scene), used, allowed, scene.tetflora.expand_everything, processes)
 
 
 def learn(expected: Estimate | None, seconds: float) -> None:

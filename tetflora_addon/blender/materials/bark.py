@@ -240,8 +240,7 @@ def _grown(graph: Graph, given: dict[str, Term]) -> dict[str, Term]:
     age, color = given["Age"], given["Color"]
     radii = given["Girth"] / tau
     noise = graph.noise(given["Round"] * (radii * _PATCHES), 4.0, 0.65)[0]
-    normal = graph.outputs("ShaderNodeNewGeometry")["Normal"]
-    damp = graph.step(graph.vector('DOT_PRODUCT', normal, _SHADY), -0.3, 0.9)
+    damp = graph.step(graph.vector('DOT_PRODUCT', graph.outputs("ShaderNodeNewGeometry")["Normal"], _SHADY), -0.3, 0.9)
     height = given["Along"] * radii
     # The foot is damp all around.
     damp = graph.step(height, _SPLASH, 0.0) * 0.6 + damp * graph.step(height, _MOSSY, 0.0)

@@ -53,8 +53,7 @@ _DIGITS = (1187.0, 2039.0, 3121.0)
 class BladeLook:
     """How leaves of a kind look."""
 
-    #: Veins of second order to a leaf's length, on either side of the midrib; 0 for none. Of parallel ones, to the
-    #: length as well.
+    #: Veins of second order to a leaf's length, on either side of the midrib, or parallel ones; 0 for none.
     veins: float
     angle: float  # between them and the midrib, degrees
     #: midrib, lines: How much lighter midrib and veins are in reflected light
