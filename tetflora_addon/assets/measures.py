@@ -67,8 +67,7 @@ def kites_of(
     values, vectors = np.linalg.eigh(spread)
     done = np.cumsum(optical)
     at = (done - optical)[first] + uniform(key_of_seed(number), _PLANE) * area
-    last = np.append(first[1:], len(optical)) - 1
-    pick = np.clip(np.searchsorted(done, at, side="right"), first, last)
+    pick = np.clip(np.searchsorted(done, at, side="right"), first, np.append(first[1:], len(optical)) - 1)
     plane, long = normal[pick], vectors[:, :, 2]
     along = long - np.einsum("ni,ni->n", long, plane)[:, None] * plane
     flat = np.linalg.norm(along, axis=1) < 0.1  # a face across the leaf, as of its rim: any direction will do
@@ -137,8 +136,7 @@ def patch_table_of(source: AssetSource, patches: tuple[Patches | None, ...]) -> 
         at = np.flatnonzero(source.surface[part] == s)
         if own is not None and len(at):
             matrix = source.matrices[part[at]].astype(np.float32)
-            local = own.center[patch[at]]
-            center[at] = np.einsum("nij,nj->ni", matrix[:, :3, :3], local) + matrix[:, :3, 3]
+            center[at] = np.einsum("nij,nj->ni", matrix[:, :3, :3], own.center[patch[at]]) + matrix[:, :3, 3]
             triangles[at] = np.diff(own.first)[patch[at]]
             solid[at] = own.solid[patch[at]]
             scale = np.cbrt(np.abs(np.linalg.det(matrix[:, :3, :3])))

@@ -30,11 +30,9 @@ def _axis_envelope(row: Table) -> tuple[NDArray, NDArray, NDArray, NDArray]:
     joint = np.repeat(_joint_turns(row), [(segments + 1) // 2, segments // 2])
     joint[0] = widest_sway(row) / segments  # the first segment sets out straight, but for the wind
     turn = np.minimum(np.cumsum(joint), np.pi)
-    sideways = np.sin(np.minimum(turn, np.pi / 2)) / segments
-    radius = np.concatenate([[0], np.cumsum(sideways)])
+    radius = np.concatenate([[0], np.cumsum(np.sin(np.minimum(turn, np.pi / 2)) / segments)])
     low = np.concatenate([[0], np.cumsum(np.cos(turn)) / segments])
-    high = np.linspace(0, 1, segments + 1)
-    return radius, low, high, turn
+    return radius, low, np.linspace(0, 1, segments + 1), turn
 
 
 def _joint_turns(row: Table) -> Floats:

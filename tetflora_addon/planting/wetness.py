@@ -106,8 +106,7 @@ def height_grid(triangles: Floats, cell: float) -> HeightGrid:
         owner, offset = spread(number[run])
         own = run.start + owner
         _draw(corners, slope, own, lowest[own] + offset, columns, top)
-    height = np.where(np.isneginf(top), np.nan, top).reshape(rows, columns)
-    return HeightGrid(west, south, cell, height)
+    return HeightGrid(west, south, cell, np.where(np.isneginf(top), np.nan, top).reshape(rows, columns))
 
 
 _HAIR = 1e-9  # of a cell: middles on a border belong to both sides

@@ -198,8 +198,7 @@ def colors_of(level: Level, mode: str, deepest: int) -> Floats32:
     if mode == "VISIBILITY":
         return ramp(level.visibility)
     if mode == "CONTRIBUTION":
-        pixels = np.maximum(level.contribution, _LEAST)
-        return ramp(np.log(pixels / _LEAST) / np.log(_MOST / _LEAST))
+        return ramp(np.log(np.maximum(level.contribution, _LEAST) / _LEAST) / np.log(_MOST / _LEAST))
     if mode == "FORM":
         table = np.zeros((len(Decision), 3), np.float32)
         for decision, color in FORMS.items():

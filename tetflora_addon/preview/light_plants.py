@@ -197,8 +197,7 @@ def nearest(shapes: Shapes, eye: Floats, most: int = MOST_FACES) -> tuple[Shapes
     size = crowns.forms[:, 1] ** 2 / np.maximum(np.einsum("ni,ni->n", away, away), 1e-6)
     some = np.argpartition(size, -most)[-most:] if len(size) > most else np.arange(len(size))
     some = some[np.argsort(-size[some])]  # the nearest hide what is drawn after them, which then costs little
-    least = float(np.sqrt(size[some].min(initial=np.inf)))
-    return with_faces(shapes, some), least
+    return with_faces(shapes, some), float(np.sqrt(size[some].min(initial=np.inf)))
 
 
 def with_faces(shapes: Shapes, some: Integers | slice = slice(None)) -> Shapes:

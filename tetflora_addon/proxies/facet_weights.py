@@ -526,8 +526,7 @@ def weights_of(flora: Flora, number: int, states: tuple[int, ...], known: Known)
     for state in sorted({*states} - {0}):
         # Leaves that are gone change as much of what hides behind others as when the plant is full-grown.
         all_leaves, some = inverse(full), inverse(with_leaves(full.species[0], SHARES[state]))
-        hidden = np.maximum(all_leaves - 1.0, 0.05)
-        left = np.clip((some - all_leaves) / hidden, -1.0, 0.5)
+        left = np.clip((some - all_leaves) / np.maximum(all_leaves - 1.0, 0.05), -1.0, 0.5)
         out[:, state] = 1.0 / np.clip(
             grown + left * np.maximum(grown - 1.0, 0.05), 1.0 / _HIGHEST_WEIGHT, 1.0 / _LOWEST_WEIGHT
         )

@@ -180,8 +180,7 @@ def joined_edges(chains: Chains) -> tuple[Floats, Integers, Integers]:
         Chain of each edge.
     """
     points, edges = chains.points.copy(), chains.edges()
-    owner = np.repeat(np.arange(len(chains.cyclic)), np.diff(chains.first))
-    line = owner[edges[:, 0]]
+    line = np.repeat(np.arange(len(chains.cyclic)), np.diff(chains.first))[edges[:, 0]]
     if not len(edges):
         return points, edges, line
     near = _JOINED_WITHIN * float(np.ptp(points[:, :3], axis=0).max())
@@ -464,8 +463,7 @@ def drawn_branches(skeleton: Skeleton) -> DrawnBranches:
     bears = np.bincount(parent[~rooted], minlength=n) > 0
     heads = np.flatnonzero(~leads & (bears | ~rooted))
     generation = summed_from_root(parent, ~leads & ~rooted)
-    large = np.where(rooted[heads], -far[heads], 0)
-    heads = heads[np.lexsort((heads, large, generation[heads]))]
+    heads = heads[np.lexsort((heads, np.where(rooted[heads], -far[heads], 0), generation[heads]))]
     number = np.full(n, -1)
     number[heads] = np.arange(len(heads))
     branch = number[top(np.where(leads, parent, index))]

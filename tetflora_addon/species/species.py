@@ -277,8 +277,7 @@ def _days_north(day: float) -> float:
     half = _MIDSUMMER - _MIDWINTER
     spring = day < half
     place = day / half if spring else (day - half) / (DAYS - half)
-    near = min(1.0, 4.0 * min(place, 1.0 - place))
-    return near * (_SPRING_DAYS if spring else -_AUTUMN_DAYS)
+    return min(1.0, 4.0 * min(place, 1.0 - place)) * (_SPRING_DAYS if spring else -_AUTUMN_DAYS)
 
 
 @dataclass(frozen=True)

@@ -323,8 +323,7 @@ def dying(one: Plants, traits: StandTraits, year: int) -> Mask:
 
 def fallen(plants: Plants, last: Records, slope: tuple[NDArray, NDArray], cells: NDArray, year: float) -> DeadPlants:
     """What is left of plants that die in a year: trees that stand dead, and will fall, rather down the slope."""
-    large = (last.diameter >= _KEPT_DIAMETER) & (last.height >= _KEPT_HEIGHT)
-    kept = np.flatnonzero(large)
+    kept = np.flatnonzero((last.diameter >= _KEPT_DIAMETER) & (last.height >= _KEPT_HEIGHT))
     plants, last, cells = plants.take(kept), last.take(kept), cells[kept]
     lasts = np.sqrt(last.diameter.astype(np.float64) / _DEAD_DIAMETER)
     stands = np.floor((_STANDS[0] + (_STANDS[1] - _STANDS[0]) * uniform(plants.key, StandDraw.FALL) ** 2) * lasts) + 1.0

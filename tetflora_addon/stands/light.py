@@ -135,8 +135,7 @@ def layer_of(height: Floats) -> tuple[Integers, Floats]:
     a, b = _LAYERS
     height = np.maximum(height, 0.0)
     layer = ((np.sqrt(a * a + 4.0 * b * height) - a) / (2.0 * b)).astype(np.int64)
-    part = (height - layer_edge(layer)) / (a + b * (2 * layer + 1))
-    return layer, np.clip(part, 0.0, 1.0)
+    return layer, np.clip((height - layer_edge(layer)) / (a + b * (2 * layer + 1)), 0.0, 1.0)
 
 
 @dataclass
@@ -336,8 +335,7 @@ def _through(
     y = own * np.float32(0.25 * _UNIT * thick)
     r = np.float32(1.0) + y * (np.float32(0.5) + y * np.float32(1.0 / 6.0))
     q = y * r
-    power = np.square(np.square(np.float32(1.0) + q))
-    mixed /= power
+    mixed /= np.square(np.square(np.float32(1.0) + q))
     after[block] = mixed
     q *= np.float32(1.5) + q * (np.float32(1.0) + np.float32(0.25) * q)
     q += np.float32(1.0)

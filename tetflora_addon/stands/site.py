@@ -90,8 +90,7 @@ class StandSite:
         """Index (n,) of the cell, row by row, at places (n,) in meters from the corner; the nearest of those beyond."""
         rows, columns = self.height.shape
         column = np.clip((np.asarray(x) / self.cell).astype(np.intp), 0, columns - 1)
-        row = np.clip((np.asarray(y) / self.cell).astype(np.intp), 0, rows - 1)
-        return row * columns + column
+        return np.clip((np.asarray(y) / self.cell).astype(np.intp), 0, rows - 1) * columns + column
 
     def ground(self, x: NDArray, y: NDArray) -> Floats:
         """Altitude (n,) at places (n,) in meters from the corner, bilinear between the middles of cells."""

@@ -216,8 +216,7 @@ def rings_of(flora: Flora, whole: WholeBranches) -> Rings:
     if whole.lines.later is not None:
         moved = WholeBranches(branches, whole.lines.later).knots(rows)[2]
         later = moved, radius * _ring_axes(whole.lines.later, owner, t)
-    reach = radius * _ring_axes(whole.lines, owner, t)
-    return Rings(branches, owner, t, center, reach, _goes_on(owner), later)
+    return Rings(branches, owner, t, center, radius * _ring_axes(whole.lines, owner, t), _goes_on(owner), later)
 
 
 def fine_numbers(flora: Flora, whole: WholeBranches, counts: Integers) -> tuple[Integers, Integers]:

@@ -358,8 +358,7 @@ def _add_mesh(content: "hashlib._Hash", mesh: bpy.types.Mesh, slots: Slots) -> N
         if kind in _TYPES and (attribute.name in wanted or kind == 'FLOAT2'):
             content.update(f"{attribute.name} {attribute.domain} {kind}".encode())
             content.update(values_of(attribute, "color" if kind in _COLORS else ""))
-    first = next((layer.name for layer in mesh.uv_layers if layer.active_render), "")
-    content.update(first.encode())
+    content.update(next((layer.name for layer in mesh.uv_layers if layer.active_render), "").encode())
 
 
 #: Triangles whose corners become vertices at once.

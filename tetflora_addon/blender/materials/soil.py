@@ -104,8 +104,7 @@ def _image(name: str, colors: Floats, green: Floats) -> bpy.types.Image:
     image = bpy.data.images.new(name, columns, rows, alpha=True)
     image[MARK] = True
     image.alpha_mode = 'CHANNEL_PACKED'
-    encoded = srgb_of(np.clip(colors, 0.0, 1.0))
-    pixels = np.concatenate([encoded, np.clip(green, 0.0, 1.0)[..., None]], axis=2)
+    pixels = np.concatenate([srgb_of(np.clip(colors, 0.0, 1.0)), np.clip(green, 0.0, 1.0)[..., None]], axis=2)
     image.pixels.foreach_set(np.ascontiguousarray(pixels, np.float32).reshape(-1))
     image.pack()
     return image

@@ -206,8 +206,7 @@ def _sky(node: bpy.types.Node, factor: float, turn: float, notes: list[str]) -> 
 
     suns: tuple[Light, ...] = ()
     if getattr(node, "sun_disc", False) and disc.any() and elevation > 0.0:
-        color = disc * node.sun_intensity
-        suns = (Light('SUN', np.zeros(3), -toward, float(node.sun_size), color=color),)
+        suns = (Light('SUN', np.zeros(3), -toward, float(node.sun_size), color=disc * node.sun_intensity),)
     return World.of(radiance), suns
 
 

@@ -183,8 +183,7 @@ def pyramid(camera: Camera, far: float, color: tuple[float, float, float, float]
     parts = []
     for depth in (camera.near, max(far, 2.0 * camera.near)):
         wide = rim * depth if camera.kind == "PERSP" else rim
-        local = np.concatenate([wide, np.full((4, 1), -depth)], axis=1)
-        parts.append(local @ camera.frame.T + camera.position)
+        parts.append(np.concatenate([wide, np.full((4, 1), -depth)], axis=1) @ camera.frame.T + camera.position)
     ring = [(i, (i + 1) % 4) for i in range(4)]
     edges = [*ring, *((a + 4, b + 4) for a, b in ring), *((i, i + 4) for i in range(4))]
     return batch('LINES', np.concatenate(parts), np.tile(color, (8, 1)), np.array(edges))

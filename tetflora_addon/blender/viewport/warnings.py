@@ -137,9 +137,6 @@ def _enlarge(obj: bpy.types.Object, scene: bpy.types.Scene) -> None:
     obj.scale = [factor * value for value in obj.scale]
     if obj.parent is None and obj.data.users == 1:
         _apply(obj, scene)
-    for rules in map(rules_of, scene.tetflora.layers):
-        if obj in grounds_of(scene, rules):  # its plants stand in the middle: now it is due
-            setattr(rules, "grown_by" if hasattr(rules, "grown_by") else "placed_by", "elsewhere")
 
 
 def _apply(obj: bpy.types.Object, _scene: bpy.types.Scene) -> None:
