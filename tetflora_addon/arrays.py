@@ -276,8 +276,7 @@ def unit(a: NDArray) -> NDArray:
 
 def perpendicular(axis: NDArray) -> NDArray:
     """A unit vector (n, 3) across each of unit vectors (n, 3), turned about it as may be."""
-    helper = np.where(np.abs(axis[:, 2:]) < 0.9, [[0.0, 0.0, 1.0]], [[1.0, 0.0, 0.0]])
-    return unit(np.cross(axis, helper))
+    return unit(np.cross(axis, np.where(np.abs(axis[:, 2:]) < 0.9, [[0.0, 0.0, 1.0]], [[1.0, 0.0, 0.0]])))
 
 
 def spiral(z: NDArray, index: NDArray, step: float) -> NDArray:

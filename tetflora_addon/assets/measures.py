@@ -276,8 +276,7 @@ def _leaves(run: Run, optical: Floats, normal: Floats) -> AssetKites:
 
 def shared_out(leaf: Floats, wood: Floats, number: int) -> Integers:
     """How many of a number of samples are on leaves and how many on wood (c, 2), by their optical areas (c,)."""
-    total = np.maximum(leaf + wood, 1e-300)
-    on_leaves = np.clip(np.rint(number * leaf / total), FEWEST, number - FEWEST)
+    on_leaves = np.clip(np.rint(number * leaf / np.maximum(leaf + wood, 1e-300)), FEWEST, number - FEWEST)
     on_leaves = np.where(leaf <= 0.0, 0, np.where(wood <= 0.0, number, on_leaves))
     on_wood = np.where(wood <= 0.0, 0, number - on_leaves)
     return np.stack([on_leaves, on_wood], axis=1).astype(np.int64)

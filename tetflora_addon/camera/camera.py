@@ -410,8 +410,7 @@ def silhouette_area(local: Floats, low: Floats, high: Floats, camera: Camera) ->
     mixed = np.flatnonzero(~ahead.all(axis=1) & whole)
     for face, corners in enumerate(FACES):
         area[mixed, face] = _clipped_area(local[mixed[:, None], corners], camera)
-    total = (np.abs(area).sum(axis=1) + np.abs(area.sum(axis=1))) / 2.0
-    return np.where(whole, total, 0.0), whole
+    return np.where(whole, (np.abs(area).sum(axis=1) + np.abs(area.sum(axis=1))) / 2.0, 0.0), whole
 
 
 def _clipped_area(triangles: Floats, camera: Camera) -> Floats:

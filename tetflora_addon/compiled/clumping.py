@@ -213,8 +213,7 @@ class WoodOutlines:
     def shown(self, direction: Floats) -> Floats:
         """Area (n,) that each part shows in a direction, m²: that of its outline."""
         along = self.ends[:, 1] - self.ends[:, 0]
-        across = along - (along @ direction)[:, None] * direction
-        return self.radii.sum(axis=1) * np.linalg.norm(across, axis=1)
+        return self.radii.sum(axis=1) * np.linalg.norm(along - (along @ direction)[:, None] * direction, axis=1)
 
     def outlines(self, near: Integers, u: NDArray, v: NDArray) -> tuple[NDArray, NDArray, NDArray]:
         """Corners (4 n, 2), first corners and numbers (n,), as `LeafOutlines.outlines`; one quad each."""

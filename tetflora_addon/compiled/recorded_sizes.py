@@ -121,8 +121,7 @@ def crowds(species: Species) -> bool:
 
 def of_dense_stand(species: Species) -> Species:
     """A species as it grows between neighbors."""
-    leafy = replace(species, stand_leaves=max(species.stand_leaves, _LEAFY))
-    return replace(with_habit(leafy, 1.0), habit=0.0)
+    return replace(with_habit(replace(species, stand_leaves=max(species.stand_leaves, _LEAFY)), 1.0), habit=0.0)
 
 
 def sized(

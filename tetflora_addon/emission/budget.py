@@ -412,8 +412,7 @@ def _through(stand: Stand, parts: CrownParts, plant: Integers, extent: Floats) -
     """Layers of leaves (n,) that are drawn beside those that fill pixels: of crowns that are small all are."""
     radius = np.maximum(stand.radius, 1e-9)
     # Of plants that stand for others as well, the leaves of one.
-    area = np.bincount(plant, parts.number * parts.area, len(radius))
-    through = area / (np.pi * radius**2 * stand.number)
+    through = np.bincount(plant, parts.number * parts.area, len(radius)) / (np.pi * radius**2 * stand.number)
     return through[plant] * np.minimum(DETAIL * extent / (2.0 * radius[plant]), 1.0)
 
 

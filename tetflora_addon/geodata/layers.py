@@ -330,8 +330,7 @@ def _binary(file: BytesIO, depth: int = 0) -> _Feature | None:
     size = 2 + (code >> 31) + (code >> 30 & 1) + (0, 1, 1, 2)[heights]
 
     def points(many: int) -> list[list[float]]:
-        flat = np.frombuffer(file.read(8 * size * many), f"{order}f8")
-        return flat.reshape(many, size)[:, :2].tolist()
+        return np.frombuffer(file.read(8 * size * many), f"{order}f8").reshape(many, size)[:, :2].tolist()
 
     if kind == 1:
         (point,) = points(1)

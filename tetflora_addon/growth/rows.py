@@ -90,8 +90,7 @@ def grow_children(
     power = nodes.power if p == 0 else 1.0
     inside = low < start[0] * now < high
     mean = float(np.clip((start[0] * now - low) / here, 0, 0.999))
-    ends = law.place_of([last - nodes.fresh * (last - first), last])
-    fresh, until = np.clip((ends - low) / here, mean, 1)
+    fresh, until = np.clip((law.place_of([last - nodes.fresh * (last - first), last]) - low) / here, mean, 1)
     variation = min(start[1] * now / here, mean, 0.999 - mean) if inside else 0.0
     starts = mean + variation * _GAUSS  # numbers are not linear in the start, so that their mean is not that of it
     varies = start[1] / start[0] if start[0] > 0 else 0.0

@@ -304,8 +304,7 @@ def mean_autumn_colors(year: Table, hue: Floats) -> Floats:
     """Means (n, 3) of the same over the leaves of plants with hues (n,)."""
     number = np.maximum(year["colors"], 1)[:, None]
     first = (_OF_PLANT * hue)[:, None]
-    edges = np.arange(MAX_AUTUMN + 1) / number
-    inside = np.clip(edges, first, first + 1.0 - _OF_PLANT)
+    inside = np.clip(np.arange(MAX_AUTUMN + 1) / number, first, first + 1.0 - _OF_PLANT)
     share = np.diff(inside, axis=1) / (1.0 - _OF_PLANT)
     return np.einsum("nk,nkc->nc", share, year["autumn"])
 

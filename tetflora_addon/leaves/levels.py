@@ -416,8 +416,7 @@ def _fan(model: LeafModel) -> tuple[Floats, Floats]:
     points = np.ascontiguousarray(corners.swapaxes(0, 1))
     # Negative where a face is concave; triangles at the ends of a fan have none.
     vectors = np.cross(points[:, 1] - points[:, 0], points[:, 2] - points[:, 0]) / 2
-    area = np.copysign(np.linalg.norm(vectors, axis=1), np.einsum("ti,ti->t", vectors, normals[face]))
-    return points, area
+    return points, np.copysign(np.linalg.norm(vectors, axis=1), np.einsum("ti,ti->t", vectors, normals[face]))
 
 
 def _longer_axis(points: Floats, weight: Floats, normal: Floats) -> NDArray:

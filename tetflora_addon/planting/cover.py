@@ -121,8 +121,7 @@ def light_on(sheet: Sheet, canopy: Canopy) -> Generator[float, None, Floats]:
                 v = aside / wide[owner, None]
                 a = (v * v).sum(axis=1) + 1.0 / half[owner] ** 2
                 b = (u * v).sum(axis=1)
-                inside = b * b - a * ((u * u).sum(axis=1) - 1.0)
-                chord = 2.0 * np.sqrt(np.maximum(inside, 0.0)) / a / cosine
+                chord = 2.0 * np.sqrt(np.maximum(b * b - a * ((u * u).sum(axis=1) - 1.0), 0.0)) / a / cosine
                 depth += np.bincount(cell, thick[owner] * chord, minlength=len(depth))
                 yield done
             light += weight / number * np.exp(-depth)

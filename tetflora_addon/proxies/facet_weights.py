@@ -554,8 +554,7 @@ def _alike(rows: Table, other: Table) -> Integers:
         own, there = np.flatnonzero(rows["order"] == order), np.flatnonzero(other["order"] == order)
         if not len(there):  # none of these branches yet, or no more
             there = np.flatnonzero(other["order"] <= order)[-1:]
-        middle = other["part"][there].mean(axis=1)
-        away = np.abs(rows["part"][own].mean(axis=1)[:, None] - middle)
+        away = np.abs(rows["part"][own].mean(axis=1)[:, None] - other["part"][there].mean(axis=1))
         out[own] = there[np.argmin(away, axis=1)]
     return out
 

@@ -290,8 +290,7 @@ class PanoramaBuffer:
             self._weight[number, cells[some]] = outline.pixels
             pixels[some] += outline.pixels
             opacity[some] += outline.pixels * outline.opacity
-        outside = self.camera.distance_to_view(vertices.reshape(-1, 3)).reshape(-1, 4)
-        whole = (outside <= 0.0).all(axis=1)
+        whole = (self.camera.distance_to_view(vertices.reshape(-1, 3)).reshape(-1, 4) <= 0.0).all(axis=1)
         return Outline(pixels, opacity / np.where(pixels > 0.0, pixels, 1.0), whole)
 
     def remove(self, chosen: Mask) -> None:

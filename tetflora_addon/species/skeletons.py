@@ -508,8 +508,7 @@ def _roots(points: Floats, pairs: Integers, size: float) -> Integers:
 
 def _pipe_radii(points: Floats, parent: Integers) -> Floats:
     """Radii (p,) by the pipe rule, see `skeleton_from_edges`."""
-    before = np.where(parent < 0, np.arange(len(parent)), parent)
-    step = np.linalg.norm(points - points[before], axis=1)
+    step = np.linalg.norm(points - points[np.where(parent < 0, np.arange(len(parent)), parent)], axis=1)
     longest = float(longest_way(parent, step).max())
     tips = np.bincount(parent[parent >= 0], minlength=len(points)) == 0
     wood = np.where(tips, _TIP * longest, 0.0)
@@ -527,8 +526,7 @@ def _base_radius(knots: Floats, radius: Floats, base: Integers, count: Integers)
     run = np.linalg.norm(knots[base + 1] - knots[base], axis=1)
     rise = np.linalg.norm(knots[beyond] - knots[base + 1], axis=1)
     steeper = np.maximum(here - radius[beyond], 0.0) * run / np.where(rise > 0, rise, np.inf)
-    start = np.where(here + steeper > 0, here + steeper, 0.5 * fork)
-    return np.minimum(start, np.maximum(fork, here))
+    return np.minimum(np.where(here + steeper > 0, here + steeper, 0.5 * fork), np.maximum(fork, here))
 
 
 def _arc(knots: Floats, first: Integers) -> Floats:

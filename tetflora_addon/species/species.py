@@ -524,8 +524,7 @@ def whole_cuts(order: Order) -> list[float]:
     cuts = [0.0, *(order.fork_at + (1 - order.fork_at) * k / levels for k in range(levels)), 1.0]
     if order.growing is None:
         return cuts
-    reached = max(sum(cut < order.growing.now - _FORKS_FROM for cut in cuts[:-1]), 1)
-    return cuts[: reached + 1]
+    return cuts[: max(sum(cut < order.growing.now - _FORKS_FROM for cut in cuts[:-1]), 1) + 1]
 
 
 def crown_ratio(shape: Integers, r: Floats) -> Floats:

@@ -220,8 +220,7 @@ class LightGrid:
         length = np.take(height - base, found.crown)
         # A cone loses its height with the distance from the middle, a dome half of it with the square of that.
         cone = np.take(top, found.crown)
-        lost = cone * np.sqrt(found.far) + (1.0 - cone) * 0.6 * found.far
-        length *= 1.0 - np.minimum(lost, 1.0 - _THIN)
+        length *= 1.0 - np.minimum(cone * np.sqrt(found.far) + (1.0 - cone) * 0.6 * found.far, 1.0 - _THIN)
         leaves = np.take(crowns.leaves[index] / (size**2 * _UNIT), found.crown) * found.part
         density = np.rint(leaves / np.maximum(length, 1e-3))
         column, area = found.column % self.columns, (high - low) * self.columns

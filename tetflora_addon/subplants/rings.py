@@ -289,8 +289,7 @@ def fine_rings(flora: Flora, whole: WholeBranches, fine: Fineness, counts: Integ
     light[above] *= narrow.astype(np.float32)
 
     def placed(lines: Axes) -> tuple[NDArray, NDArray]:
-        bent = _curve(flora, replace(whole, lines=lines), fine.weight)
-        center, across = bent.at(owner, segment, x, allowed)
+        center, across = _curve(flora, replace(whole, lines=lines), fine.weight).at(owner, segment, x, allowed)
         center += down
         tip = lines.frames[last, segments[last] - 1, :, 2]
         center[above] += high[:, None] * tip

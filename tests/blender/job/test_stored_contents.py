@@ -232,3 +232,50 @@ def test_no_step_reads_more_than_one_thing(plants, monkeypatch, what):
     stored_contents._forget()
     number = sum(1 for _ in stored_contents.stored_contents_steps(plants.id_data, plants))
     assert number >= 2 * 300 + (50 if "mesh" in what else 0)
+
+
+@pytest.mark.parametrize("hidden", ["lamp", "wall", "plant"])
+def test_undo_of_something_else_does_not_make_results_out_of_date(blender, hidden):
+    """Nobody evaluates what is hidden: after undo its place in the world was none, and the light had changed."""
+    session.clean_file()
+    scene = bpy.context.scene
+    add_camera()
+    add_plant("plant", location=(1.0, 2.0, 0.0))
+    add_mesh("wall").tetflora.is_occluder = True
+    add_mesh("rock")
+    scene.collection.objects.link(bpy.data.objects.new("lamp", bpy.data.lights.new("lamp", 'SUN')))
+    for name in ("wall", "lamp"):
+        bpy.data.objects[name].location = (5.0, 1.0, 2.0)
+    bpy.context.view_layer.update()
+    bpy.data.objects[hidden].hide_viewport = True
+    bpy.context.view_layer.update()
+    before = auto.results_made_for(scene)
+    bpy.ops.ed.undo_push(message="made")
+    bpy.data.objects["rock"].location.z = 1.0
+    bpy.ops.ed.undo_push(message="moved")
+    bpy.ops.ed.undo()
+    scene = bpy.context.scene
+    assert auto.results_made_for(scene) == before
+    for name in (hidden, "rock"):  # Blender tells of no change of what is hidden, but of the other
+        bpy.data.objects[name].location.z += 1.0
+    bpy.context.view_layer.update()
+    assert auto.results_made_for(scene) != before
+
+
+def test_a_parent_of_a_mesh_that_results_hide_is_heard_of(blender):
+    """Its place in the world stays what it was before it was hidden."""
+    session.clean_file()
+    scene = bpy.context.scene
+    add_camera()
+    sheet, carrier = add_mesh("sheet"), bpy.data.objects.new("carrier", None)
+    scene.collection.objects.link(carrier)
+    sheet.tetflora.is_explicit, sheet.parent = True, carrier
+    carrier.location = (1.0, 2.0, 3.0)
+    bpy.context.view_layer.update()
+    before = auto.results_made_for(scene)
+    assert bpy.ops.tetflora.refine() == {'FINISHED'}
+    assert not sheet.visible_get()
+    assert auto.results_made_for(scene) == before
+    carrier.location.x += 1.0
+    bpy.context.view_layer.update()
+    assert [name for name, text in auto.results_made_for(scene).items() if before[name] != text] == ["the meshes"]

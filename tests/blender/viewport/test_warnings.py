@@ -55,7 +55,7 @@ def test_darkness_is_seen_and_daylight_ends_it():
 def test_a_world_lights_by_its_color(color, dark):
     world = bpy.context.scene.world = bpy.data.worlds.new("own")
     shader_tree(world).nodes["Background"].inputs["Color"].default_value = (*color, 1.0)
-    assert warnings.is_dark(bpy.context.scene) == dark
+    assert warnings.is_dark(bpy.context.scene, []) == dark
 
 
 def test_daylight_never_touches_what_is_the_artists():
@@ -136,6 +136,25 @@ def test_crowns_of_a_field_count_and_are_asked_for_by_species(monkeypatch):
     assert sorted(asked) == ["bush", "fern"]
     bpy.context.scene.camera.location.z = 10.0
     assert "crown" not in _keys()
+
+
+def test_many_plants_are_looked_at_one_by_one_between_redraws():
+    """At once, 100,000 of them stopped the window for a second."""
+    for number in range(200):
+        add_plant(f"plant {number}", location=(0.0, float(number), 0.0))
+    add_camera(location=(0.0, -20.0, 1.7)).data.clip_end = 100.0
+    bpy.context.view_layer.update()
+    steps = warnings._look_steps(bpy.context.scene, bpy.context.view_layer)
+    found, number = [], 0
+    try:
+        while True:
+            next(steps)
+            number += 1
+    except StopIteration as stop:
+        found = stop.value
+    assert number >= 200
+    assert [one.key for one in found] == _keys()
+    assert {"clip", "light"} <= set(_keys())
 
 
 def test_a_slow_first_look_does_not_delay_the_next(monkeypatch):

@@ -7,7 +7,7 @@ is taken as stored, in small steps of a second in all, and only after Blender ha
 looked at always.
 """
 
-from collections.abc import Generator
+from collections.abc import Generator, Iterator
 from hashlib import blake2b
 
 import bpy
@@ -44,14 +44,23 @@ def stored_contents_steps(scene: bpy.types.Scene, layer: bpy.types.ViewLayer) ->
     return _found[key][1]
 
 
+def _lineage(obj: bpy.types.Object | None) -> Iterator[bpy.types.Object]:
+    while obj is not None:
+        yield obj
+        obj = obj.parent
+
+
 def _read(
     scene: bpy.types.Scene, layer: bpy.types.ViewLayer, shown: dict[int, bool]
 ) -> Generator[None, None, dict[str, str]]:
     kinds, sums = set(), dict.fromkeys(("the plants", "the meshes", "the light"), 0)
 
-    def add(part: str, obj: bpy.types.Object | None, *said: object) -> None:
-        """Sums, as the order of objects is none of theirs."""
-        place = b"" if obj is None else np.array(obj.matrix_world, np.float32).tobytes()
+    def add(part: str, obj: bpy.types.Object | None, *said: object, hideable: bool = False) -> None:
+        """Sums, as the order of objects is none of theirs. Nobody evaluates what is hidden, least of all after undo."""
+        places = [] if obj is None else [obj.matrix_world]
+        if obj is not None and (hideable or not shown.get(obj.session_uid)):
+            places = [one.matrix_basis for one in _lineage(obj)]
+        place = np.array(places, np.float32).tobytes()
         sums[part] += int.from_bytes(blake2b(repr(said).encode() + place, digest_size=8).digest())
 
     add("the light", None, sky_suns(scene))
@@ -66,12 +75,13 @@ def _read(
             form = obj if group.is_field else group.skeleton
             add("the plants", obj, said, (yield from form_steps(form)) if form else None)
         elif (lamp := obj.type == 'LIGHT') or ((group.is_occluder or may_take_part(obj)) and not is_ours(obj)):
-            where = obj.matrix_basis[:], artists_flags(obj)  # what is hidden has no other place
-            add("the light" if lamp else "the meshes", obj, obj.name_full, where, (yield from form_steps(obj)))
+            said = obj.name_full, artists_flags(obj), (yield from form_steps(obj))
+            add("the light" if lamp else "the meshes", obj, said, hideable=not lamp and may_take_part(obj))
         yield
     for identifier, own, parts in [(key, one.object, one.collection) for key, one in asset_species(scene).items()]:
         if identifier in kinds and own is not None:  # it stands where its plants do
-            add("the meshes", None, identifier, own.matrix_world.to_3x3()[:], (yield from form_steps(own)))
+            turned = own.matrix_world if shown.get(own.session_uid) else own.matrix_basis
+            add("the meshes", None, identifier, turned.to_3x3()[:], (yield from form_steps(own)))
         for obj in objects_within(parts) if identifier in kinds and own is None else ():
             add("the meshes", obj, identifier, (yield from form_steps(obj)))
     return {part: f"{total % 2**64:016x}" for part, total in sums.items()}

@@ -245,7 +245,7 @@ def objects_within(collection: bpy.types.Collection) -> list[bpy.types.Object]:
 
 
 def in_parts(objects: bpy.types.bpy_prop_collection, few: int = 5000) -> Iterator[bpy.types.Object]:
-    """Objects of a view layer or scene, of which some may go meanwhile; so few are read from its chain at a time."""
+    """Objects of a view layer, of which some may go meanwhile; so few are read from its chain at a time."""
     for begin in range(0, len(objects), few):
         yield from filter(None, objects[begin : begin + few])
 
