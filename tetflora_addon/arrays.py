@@ -172,8 +172,7 @@ def spread(counts: Integers) -> tuple[Integers, Integers]:
 
 def chunks(counts: NDArray, limit: float) -> Iterator[slice]:
     """Runs of things, of which ``counts`` (n,), perhaps expected ones, sum up to about a limit each."""
-    block = (np.cumsum(counts) / limit).astype(np.int64)
-    edges = np.flatnonzero(np.diff(block)) + 1
+    edges = np.flatnonzero(np.diff((np.cumsum(counts) / limit).astype(np.int64))) + 1
     for start, stop in zip([0, *edges], [*edges, len(counts)], strict=True):
         if stop > start:
             yield slice(int(start), int(stop))

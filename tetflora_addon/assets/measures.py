@@ -128,8 +128,7 @@ class PatchTable:
 
 def patch_table_of(source: AssetSource, patches: tuple[Patches | None, ...]) -> PatchTable:
     """All patches of the parts of a source, from those of its surfaces."""
-    number = np.array([0 if p is None else len(p) for p in patches])
-    part, patch = spread(number[source.surface])
+    part, patch = spread(np.array([0 if p is None else len(p) for p in patches])[source.surface])
     center, triangles = np.zeros((len(part), 3), np.float32), np.zeros(len(part), np.int32)
     solid, (island, share, width) = np.zeros(len(part), bool), np.zeros((3, len(part)))
     for s, own in enumerate(patches):
@@ -278,8 +277,7 @@ def shared_out(leaf: Floats, wood: Floats, number: int) -> Integers:
     """How many of a number of samples are on leaves and how many on wood (c, 2), by their optical areas (c,)."""
     on_leaves = np.clip(np.rint(number * leaf / np.maximum(leaf + wood, 1e-300)), FEWEST, number - FEWEST)
     on_leaves = np.where(leaf <= 0.0, 0, np.where(wood <= 0.0, number, on_leaves))
-    on_wood = np.where(wood <= 0.0, 0, number - on_leaves)
-    return np.stack([on_leaves, on_wood], axis=1).astype(np.int64)
+    return np.stack([on_leaves, np.where(wood <= 0.0, 0, number - on_leaves)], axis=1).astype(np.int64)
 
 
 def well_spread(counts: Integers) -> tuple[Integers, Integers]:

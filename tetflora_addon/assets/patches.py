@@ -383,5 +383,4 @@ def _divided(
     runs = np.repeat(np.arange(len(low)), 1 + dividing)
     second = np.diff(runs, prepend=-1) == 0
     new_low = np.where(second, middle[runs], low[runs])
-    new_high = np.where(~second & dividing[runs], middle[runs], high[runs])
-    return order, new_low, new_high, number[runs]
+    return order, new_low, np.where(~second & dividing[runs], middle[runs], high[runs]), number[runs]

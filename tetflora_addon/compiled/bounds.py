@@ -185,8 +185,7 @@ def _unit_bound(rows: Table, index: int, bounds: Floats, raised: bool) -> Floats
             first_fraction, last_fraction = np.tile(np.reshape(among, (2, 1)), _SLABS)
         r, lo, hi = (np.interp(t, knot_t, v) for v in (radius, low, high))
         first = np.minimum((t[:-1] * row["segments"]).astype(int), len(turn) - 1)
-        last = np.minimum((t[1:] * row["segments"]).astype(int), len(turn) - 1)
-        dev = np.maximum(turn[first], turn[last])
+        dev = np.maximum(turn[first], turn[np.minimum((t[1:] * row["segments"]).astype(int), len(turn) - 1)])
         base, variation = child["angle"]
         lean = [base + (child["angle_tip"] - base) * one for one in (first_fraction, last_fraction)]
         most = np.clip(np.maximum(*lean) + variation + dev, 0, np.pi)

@@ -424,8 +424,7 @@ def _plants(rows: Table, first: int, polygons: Floats) -> list[Branches]:
             break
         order = np.argsort(-polygons[grown.row], kind="stable")
         order = order[: (polygons[grown.row] >= 0.5 * polygons[grown.row].max()).sum()]
-        pick = order[(np.arange(min(number, len(order))) * len(order)) // min(number, len(order))]
-        plants = grown.take(pick)
+        plants = grown.take(order[(np.arange(min(number, len(order))) * len(order)) // min(number, len(order))])
     return [plants.take(slice(i, i + 1)) for i in range(len(plants))]
 
 

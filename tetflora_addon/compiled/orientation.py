@@ -330,8 +330,7 @@ def face_planes(rows: Table, forms: Sequence[Sequence[Sequence[LeafModel]]]) -> 
 
     The third axis is the normal of the face, the second as near as can be to the midrib. Each stands for the same area.
     """
-    own = np.stack([rows["species"], rows["leaf_kind"]], axis=1)
-    kinds, kind = np.unique(own, axis=0, return_inverse=True)
+    kinds, kind = np.unique(np.stack([rows["species"], rows["leaf_kind"]], axis=1), axis=0, return_inverse=True)
     return np.array([_planes_of(forms[s][k]) for s, k in kinds.tolist()])[kind.ravel()]
 
 

@@ -135,8 +135,7 @@ def chosen_facets(polygons: Polygons, optical: Floats, side: Floats) -> Facets:
     owner, triangle, _ = polygons.triangles()
     vector, key = meshes.vectors(triangle, polygons.instance[owner]), key_of_seed(polygons.instance)[owner]
     own = np.linalg.norm(vector, axis=1)
-    of_polygon = np.bincount(owner, own, len(polygons))
-    rate = optical / (np.maximum(of_polygon, 1e-300) * np.maximum(side, 1e-12) ** 2)
+    rate = optical / (np.maximum(np.bincount(owner, own, len(polygons)), 1e-300) * np.maximum(side, 1e-12) ** 2)
     pick, number = spread(np.floor(own * rate[owner] + stepped(key, triangle)).astype(np.int64))
 
     thing, triangle = owner[pick], triangle[pick]

@@ -74,8 +74,7 @@ class Raster:
         for y, x in ((j, i), (j, i + 1), (j + 1, i), (j + 1, i + 1)):
             weight = (1.0 - np.abs(column - x)) * (1.0 - np.abs(row - y))
             # What does not count may be nan, and lies beyond a raster of one cell.
-            values = self.values[np.minimum(y, h - 1), np.minimum(x, w - 1)]
-            out += np.where(weight > 0.0, weight * values, 0.0)
+            out += np.where(weight > 0.0, weight * self.values[np.minimum(y, h - 1), np.minimum(x, w - 1)], 0.0)
         return out
 
     def coarser(self, most: int) -> Self:

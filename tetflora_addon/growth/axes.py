@@ -45,8 +45,7 @@ class Axes(Arrays):
         chord = self.knots[:, -1] - self.knots[:, 0]
         direction = chord / np.maximum(np.linalg.norm(chord, axis=1), 1e-300)[:, None]
         between = self.knots[:, 1:-1] - self.knots[:, :1]
-        along = np.einsum("nsi,ni->ns", between, direction)
-        square = np.einsum("nsi,nsi->ns", between, between) - along**2
+        square = np.einsum("nsi,nsi->ns", between, between) - np.einsum("nsi,ni->ns", between, direction) ** 2
         return np.sqrt(np.maximum(square, 0.0).max(axis=1, initial=0.0))
 
     def sky_at(self, branch: Integers, t: Floats) -> Floats | None:

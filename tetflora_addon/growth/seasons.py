@@ -305,8 +305,7 @@ def mean_autumn_colors(year: Table, hue: Floats) -> Floats:
     number = np.maximum(year["colors"], 1)[:, None]
     first = (_OF_PLANT * hue)[:, None]
     inside = np.clip(np.arange(MAX_AUTUMN + 1) / number, first, first + 1.0 - _OF_PLANT)
-    share = np.diff(inside, axis=1) / (1.0 - _OF_PLANT)
-    return np.einsum("nk,nkc->nc", share, year["autumn"])
+    return np.einsum("nk,nkc->nc", np.diff(inside, axis=1) / (1.0 - _OF_PLANT), year["autumn"])
 
 
 def is_gone(species: Species, season: Season | None) -> bool:

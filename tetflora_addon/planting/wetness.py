@@ -139,8 +139,7 @@ def _draw(corners: Floats, slope: Floats, own: Integers, row: Integers, columns:
     met = left <= right
     own, row, left, right = own[met], row[met], left[met], right[met]
     first = np.clip(np.ceil(left - _HAIR), 0, columns).astype(np.int64)
-    last = np.clip(np.floor(right + _HAIR), -1, columns - 1).astype(np.int64)
-    number = np.maximum(last - first + 1, 0)
+    number = np.maximum(np.clip(np.floor(right + _HAIR), -1, columns - 1).astype(np.int64) - first + 1, 0)
     for run in chunks(number, _ENTRIES):
         owner, offset = spread(number[run])
         span = run.start + owner

@@ -77,8 +77,7 @@ def fine_sides(sides: Integers, pixels: Floats) -> Integers:
     """Sides (n,) of branches of a radius in pixels (n,) whose species has so many (n,): twice that, four times, ..."""
     enough = np.pi / np.arccos(np.clip(1.0 - DEVIATION / np.maximum(pixels, DEVIATION), -1.0, 1.0 - 1e-9))
     power = np.ceil(np.log2(np.maximum(enough / sides, 1.0)) - 1e-9)
-    most = np.floor(np.log2(np.maximum(MOST_SIDES / sides, 1.0)))
-    return sides << np.minimum(power, most).astype(np.int64)
+    return sides << np.minimum(power, np.floor(np.log2(np.maximum(MOST_SIDES / sides, 1.0)))).astype(np.int64)
 
 
 def fineness(flora: Flora, whole: WholeBranches, pixels: Pixels) -> Fineness:

@@ -303,6 +303,15 @@ def test_neither_frozen_layers_nor_those_without_a_ground_nor_those_of_older_fil
     assert _due(scene) == 0
 
 
+def test_grounds_are_looked_up_and_nothing_lists_all_objects_for_them(monkeypatch):
+    """With 100,000 objects each of ten layers took 60 ms."""
+    scene = _on_ground('SCATTER')
+    monkeypatch.setattr(bpy.types.Object, "users_scene", property(lambda _: pytest.fail("listed all objects")))
+    assert rules.grounds_of(scene, _population()) == [bpy.data.objects["ground"]]
+    scene.collection.objects.unlink(bpy.data.objects["ground"])
+    assert rules.grounds_of(scene, _population()) == []
+
+
 def test_where_it_stands_goes_neither_into_copies_nor_into_files():
     scene = _on_ground('SCATTER')
     assert "stood_on" not in {prop.identifier for prop in rules.settings_of(_population())}

@@ -122,6 +122,29 @@ def test_the_camera_steps_out_of_a_crown_and_its_range_reaches_all_plants():
     assert far.location.y == 300.0
 
 
+def test_a_camera_below_the_ground_is_told_and_lifted():
+    """After the ground was lifted it saw nothing but that from below, and was said to be in a dark wood."""
+    ground = add_mesh("ground", size=50.0)
+    select(ground)
+    bpy.ops.tetflora.populate(count=3, min_distance=0.0, species="bush")
+    camera = add_camera(location=(0.0, 0.0, 1.7))
+    assert "below" not in _keys()
+    ground.location.z, ground.scale.z = 6.0, 0.5
+    assert "below" in _keys()
+    assert "shade" not in _keys()
+    _mend("below")
+    assert tuple(camera.matrix_world.translation) == pytest.approx((0.0, 0.0, 7.7))
+    camera.location.z = 3.0
+    assert "below" in _keys()
+    floor = add_mesh("floor", size=50.0)  # in a cave
+    populations.set_grounds(bpy.context.scene.tetflora.layers[0], [ground, floor])
+    assert "below" not in _keys()
+    ground.hide_set(True)
+    camera.location.z = -3.0
+    floor.hide_set(True)
+    assert "below" not in _keys()
+
+
 def test_crowns_of_a_field_count_and_are_asked_for_by_species(monkeypatch):
     """Not by plant: ground cover has thousands around the camera, and looking took seconds after each change."""
     select(add_mesh("ground", size=16.0))

@@ -440,8 +440,7 @@ def _plates(graph: Graph, place: Place) -> tuple[Term, Term, Term, Term]:
     stair = graph.math('FLOOR', layer) + graph.step(part, 0.0, 0.12)
     height = stair * 0.17 + (fine * 0.5 + graph.parts(plate.off)[2] * -0.35)
     height = solid * 0.8 + height
-    rim = graph.step(part, 0.22, 0.05)
-    lit = rim * 0.14 + (part * -0.08 + (fine * 0.65 + plate.random[1] * 0.28))
+    lit = graph.step(part, 0.22, 0.05) * 0.14 + (part * -0.08 + (fine * 0.65 + plate.random[1] * 0.28))
     red = tones(graph, lit, _RED)
     gray = tones(graph, lit, ((0.15, (0.15, 0.12, 0.105)), (0.5, (0.4, 0.33, 0.29)), (0.9, (0.76, 0.68, 0.62))))
     color = graph.mixed(graph.step(noise * 0.6 + plate.random[2], 0.45, 1.15), red, gray)

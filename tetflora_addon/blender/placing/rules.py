@@ -9,9 +9,9 @@ those without take what is left. So a riparian wood that is added to a beech for
 """
 
 import json
-from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Generator, Iterable, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
-from functools import lru_cache
+from functools import cache, lru_cache
 from hashlib import blake2b
 from itertools import takewhile
 from math import inf
@@ -209,21 +209,24 @@ def awaits_update(population: bpy.types.PropertyGroup) -> bool:
     return outdated or (gone and all(o.tetflora.population != uid for o in every))
 
 
-def forms_of(grounds: Iterable[bpy.types.Object], depsgraph: bpy.types.Depsgraph) -> str:
-    """`ground_form` of all grounds of a layer; empty where one has none."""
-    forms = [ground_form(obj, depsgraph) for obj in grounds]
+def forms_of(grounds: Iterable[bpy.types.Object], form: Callable[[bpy.types.Object], str]) -> str:
+    """The forms of all grounds of a layer, as `ground_form` gives that of each; empty where one has none."""
+    forms = list(map(form, grounds))
     return " ".join(forms) if all(forms) else ""
 
 
-def on_changed_grounds(scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer) -> set[str]:
-    """Identities of layers of which a ground was moved or edited since their plants were placed."""
-    depsgraph, rules = view_layer.depsgraph, ((one.uid, rules_of(one)) for one in scene.tetflora.layers)
-    kept = [(uid, one.stood_on, grounds_of(scene, one)) for uid, one in rules if depsgraph and one.stood_on]
-    return {uid for uid, before, grounds in kept if lies_elsewhere(before, forms_of(grounds, depsgraph))}
+def changed_steps(scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer) -> Generator[None, None, set[str]]:
+    """Find layers of which a ground was moved or edited since their plants were placed; returns their identities."""
+    found, form = set(), cache(lambda obj: ground_form(obj, view_layer.depsgraph))
+    kept = ((one.uid, rules_of(one)) for one in scene.tetflora.layers)
+    for uid, before, grounds in [(uid, one.stood_on, grounds_of(scene, one)) for uid, one in kept if one.stood_on]:
+        found |= {uid} if lies_elsewhere(before, forms_of(grounds, form)) else set()
+        yield
+    return found
 
 
-#: What `on_changed_grounds` found, a moment after each change.
-changed_grounds = Outlook(on_changed_grounds)
+#: What `changed_steps` found, a moment after each change.
+changed_grounds = Outlook(changed_steps)
 register, unregister = changed_grounds.register, changed_grounds.unregister
 
 
@@ -327,7 +330,8 @@ def grounds_of(scene: bpy.types.Scene, population: bpy.types.PropertyGroup) -> l
     if getattr(population, "ground_collection", None) is not None:  # stands have none
         named += objects_within(population.ground_collection)
     meshes = dict.fromkeys(o for o in named if o is not None and o.type == 'MESH' and not o.tetflora.is_field)
-    return [o for o in meshes if scene in o.users_scene]
+    there = ((o, scene.objects.get(o.name)) for o in meshes)  # `users_scene` lists all objects
+    return [o for o, found in there if o == found or (found is not None and scene in o.users_scene)]
 
 
 def checked_grounds(scene: bpy.types.Scene, population: bpy.types.PropertyGroup) -> list[bpy.types.Object]:

@@ -34,14 +34,14 @@ def grid_mesh(name: str, points: Floats) -> bpy.types.Mesh:
     return mesh
 
 
-def ground_form(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> str:
+def ground_form(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph | None) -> str:
     """Numbers that tell where a ground lies and how it is formed, for `lies_elsewhere`; none of one that is not shown.
 
     Each vertex has its weight, so that hardly any two forms have the same mean.
     """
-    evaluated = obj.evaluated_get(depsgraph)
-    if obj.mode == 'EDIT' or not (evaluated.is_evaluated and obj.visible_get(view_layer=depsgraph.view_layer)):
+    if depsgraph is None or obj.mode == 'EDIT' or not obj.visible_get(view_layer=depsgraph.view_layer):
         return ""
+    evaluated = obj.evaluated_get(depsgraph)
     with mesh_of(evaluated) as mesh:
         points, corners, place = read(mesh, "position"), len(mesh.loops), world_matrix(obj, depsgraph)
     weight = 0.5 + uniform(np.arange(len(points), dtype=np.uint64), 0)

@@ -24,7 +24,7 @@ from ...stands.site import StandSite, StandSpecies
 from ..attributes import write
 from ..placing.plant_objects import link_field
 from ..placing.rules import digest, forms_of, zone_values, zoned
-from ..placing.terrain import read_ground
+from ..placing.terrain import ground_form, read_ground
 from ..runtime import JobData, is_there, job
 from ..scene import fields
 from ..settings import check_limits
@@ -272,7 +272,10 @@ def _again_steps(data: JobData, field: bpy.types.Object, grounds: list[bpy.types
     soil = Soil(**{name: getattr(stand, name) for name in Soil.__dataclass_fields__})
     settings = StandSettings(**{name: getattr(stand, name) for name in StandSettings.__dataclass_fields__})
     ground = read_ground(grounds, depsgraph, **{name: getattr(stand, name) for name in _MASKS})
-    ground, stood_on = zoned(depsgraph, stand, grounds, ground), forms_of(grounds, depsgraph)
+    ground, stood_on = (
+        zoned(depsgraph, stand, grounds, ground),
+        forms_of(grounds, lambda obj: ground_form(obj, depsgraph)),
+    )
     site, corner = yield from call_in_thread(progress, stand_site, ground, soil)
     try:
         growing = steps_in_thread(grow(site, members, settings), Progress(0.0, "Growing the stand"))

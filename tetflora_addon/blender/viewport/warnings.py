@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 import bpy
 import numpy as np
-from mathutils import Matrix
+from mathutils import Matrix, Vector
 
 from ...arrays import Floats
 from ...jobs import run_to_end
@@ -38,6 +38,7 @@ _DARK = 0.1
 _NEAR = 20.0  # meters around the camera where crowns are looked at
 _TREE, _BEFORE = 4.0, 5.0  # height from which on a plant has a trunk, and how far one is that hides the view, meters
 _CLOSED = 0.6  # of the sky there; half of a picture is nearly black from two thirds on, and well lit at one half
+_MANY, _EYE = 300_000, 1.7  # faces of ground to look for the camera below; meters
 _OVERHEAD = 3.0  # meters above the camera, where crowns shade it
 
 
@@ -85,20 +86,22 @@ def mend(scene: bpy.types.Scene, key: str) -> bool:
 def _look_steps(
     scene: bpy.types.Scene, layer: bpy.types.ViewLayer | None = None
 ) -> Generator[None, None, list[Warned]]:
-    return list(_look(scene, (yield from _standing(scene, layer))))
+    layer = layer or scene.view_layers[0]
+    return list(_look(scene, layer, (yield from _standing(layer))))
 
 
-def _look(scene: bpy.types.Scene, standing: _Standing) -> Iterator[Warned]:
+def _look(scene: bpy.types.Scene, layer: bpy.types.ViewLayer, standing: _Standing) -> Iterator[Warned]:
+    grounds = list(dict.fromkeys(obj for one in scene.tetflora.layers for obj in grounds_of(scene, rules_of(one))))
     settings, camera, place = scene.tetflora, scene.camera, standing.place
     for error in render_errors()[-1:]:
         yield Warned("render", "Render failed", error)
-    small, stretched = _grounds(scene)
+    small, stretched = _grounds(grounds)
     yield from small
     if camera is None and len(place):
         text = "The scene has no camera. Turn the view to where you want to look from; Add puts one there at eye height"
         yield Warned("camera", "No camera", text, "Add")
     elif len(place):
-        yield from _camera(scene, standing)
+        yield from _camera(scene, standing, _buried(layer, grounds, scene.camera.matrix_world.translation))
     if len(place) and is_dark(scene, standing.lamps):
         text = "There is no sun, lamp or bright sky: shade renders black. Daylight adds a sun and a sky"
         yield Warned("light", "Too dark", text, "Daylight")
@@ -140,10 +143,9 @@ def is_dark(scene: bpy.types.Scene, lamps: Iterable[bpy.types.Object]) -> bool:
     return all(node.type in {'BACKGROUND', 'OUTPUT_WORLD'} for node in tree.nodes)
 
 
-def _grounds(scene: bpy.types.Scene) -> tuple[list[Warned], list[Warned]]:
+def _grounds(grounds: list[bpy.types.Object]) -> tuple[list[Warned], list[Warned]]:
     """Grounds of layers that are too small, and those whose scale is not applied."""
     small, stretched = [], []
-    grounds = dict.fromkeys(obj for layer in scene.tetflora.layers for obj in grounds_of(scene, rules_of(layer)))
     for obj in grounds:
         wide = max(obj.dimensions[:2])
         if 0.0 < wide < _SMALL:
@@ -167,9 +169,9 @@ def _apply(obj: bpy.types.Object, _scene: bpy.types.Scene) -> None:
     obj.scale = (1.0, 1.0, 1.0)
 
 
-def _standing(scene: bpy.types.Scene, layer: bpy.types.ViewLayer | None = None) -> Generator[None, None, _Standing]:
+def _standing(layer: bpy.types.ViewLayer) -> Generator[None, None, _Standing]:
     feet, plants, fields, lamps = array("d"), [], [], []
-    for obj in in_parts((layer or scene.view_layers[0]).objects):
+    for obj in in_parts(layer.objects):
         yield
         group = obj.tetflora
         if obj.hide_render or ((group.is_plant or group.is_field) and not group.enabled):
@@ -205,15 +207,31 @@ def _crowns(scene: bpy.types.Scene, standing: _Standing, at: Floats) -> tuple[Fl
     return np.concatenate(feet), np.concatenate(sizes)
 
 
-def _camera(scene: bpy.types.Scene, standing: _Standing) -> Iterator[Warned]:
+def _buried(layer: bpy.types.ViewLayer, grounds: list[bpy.types.Object], at: Vector) -> float:
+    """Meters from a place up to the uppermost ground, where there is none below it; else 0."""
+    heights: list[float] = []
+    for obj in (one for one in grounds if one.visible_get(view_layer=layer) and len(one.data.polygons) < _MANY):
+        if obj.mode == 'OBJECT' and obj.evaluated_get(layer.depsgraph).is_evaluated:
+            inverse = obj.matrix_world.inverted_safe()
+            for up in (1.0, -1.0):
+                along = (inverse.to_3x3() @ Vector((0.0, 0.0, up))).normalized()
+                hit, place, *_ = obj.ray_cast(inverse @ at, along, depsgraph=layer.depsgraph)
+                heights += [(obj.matrix_world @ place).z - at.z] if hit else []
+    return max(heights) if min(heights, default=0.0) > 0.0 else 0.0
+
+
+def _camera(scene: bpy.types.Scene, standing: _Standing, buried: float) -> Iterator[Warned]:
     camera = scene.camera
     at = np.array(camera.matrix_world.translation)
     feet, sizes = _crowns(scene, standing, at)
-    if _within(at, feet, sizes):
+    if buried:
+        text = f'"{camera.name}" is below the ground, which hides all. Move lifts it to eye height'
+        yield Warned("below", "Below ground", text, "Move", partial(_lift, buried + _EYE))
+    elif _within(at, feet, sizes):
         text = f'"{camera.name}" is inside a crown: leaves fill the picture. Move takes it to the nearest open place'
         yield Warned("crown", "In a crown", text, "Move", _step_out)
     above = (sizes[:, 0] ** 2).sum(where=feet[:, 2] + sizes[:, 1] > at[2] + _OVERHEAD)
-    if above > _CLOSED * _NEAR**2 and scene.view_settings.exposure == 0.0:
+    if not buried and above > _CLOSED * _NEAR**2 and scene.view_settings.exposure == 0.0:
         text = "The camera is in a closed wood, which is dark inside. Brighten raises Exposure in Color Management"
         yield Warned("shade", "Dark wood", text, "Brighten", _setter("view_settings.exposure", 2.5))
     text, most = cut_off(scene, standing)
@@ -226,7 +244,7 @@ def cut_off(scene: bpy.types.Scene, standing: _Standing | None = None) -> tuple[
 
     A new file's camera ends at 100 m: a forest then renders as nothing, and nobody sees why.
     """
-    place, camera = (standing or run_to_end(_standing(scene))).place, scene.camera
+    place, camera = (standing or run_to_end(_standing(scene.view_layers[0]))).place, scene.camera
     if camera is None or not len(place):
         return "", 0.0
     to_camera = np.array(camera.matrix_world.normalized().inverted_safe())
@@ -249,7 +267,7 @@ def _within(at: Floats, feet: Floats, sizes: Floats) -> bool:
 
 def open_place(scene: bpy.types.Scene, at: Floats, ahead: Floats) -> Floats:
     """The place (3,) nearest to one (3,), in meters, in no crown and with no trunk close ahead in a direction (3,)."""
-    feet, sizes = _crowns(scene, run_to_end(_standing(scene)), at)
+    feet, sizes = _crowns(scene, run_to_end(_standing(scene.view_layers[0])), at)
     trunks, ahead = feet[sizes[:, 1] > _TREE, :2], ahead[:2] / max(np.linalg.norm(ahead[:2]), 1e-6)
     for away in np.arange(0.0, _NEAR, 0.5):
         for angle in np.linspace(0.0, 2.0 * np.pi, 16, endpoint=False):
@@ -264,6 +282,10 @@ def open_place(scene: bpy.types.Scene, at: Floats, ahead: Floats) -> Floats:
 def _step_out(scene: bpy.types.Scene) -> None:
     eye = scene.camera.matrix_world
     eye.translation = open_place(scene, np.array(eye.translation), -np.array(eye.col[2]))
+
+
+def _lift(meters: float, scene: bpy.types.Scene) -> None:
+    scene.camera.matrix_world.translation.z += meters
 
 
 _outlook = Outlook(_look_steps)
