@@ -369,8 +369,7 @@ class Chunks(Generic[Rows]):
     def take_out(self, rows: Integers) -> Rows:
         """Mark and return rows (k,), ascending, none of which is marked."""
         out, start = [], 0
-        ends = np.cumsum([len(chunk) for chunk in self._chunks])
-        runs = np.split(rows, np.searchsorted(rows, ends[:-1]))
+        runs = np.split(rows, np.searchsorted(rows, np.cumsum([len(chunk) for chunk in self._chunks])[:-1]))
         for (chunk, there), own in zip(self.chunks(), runs, strict=True):
             if len(own):
                 out.append(chunk.take(own - start))

@@ -140,9 +140,7 @@ class Outlook(Generic[_Result]):
         Seconds after which a panel that is drawn asks for it anew.
     """
 
-    def __init__(
-        self, find: Callable[[bpy.types.Scene, bpy.types.ViewLayer], _Result | Generator], old: float = inf
-    ) -> None:
+    def __init__(self, find: Callable[..., _Result | Generator], old: float = inf) -> None:
         self._find, self._old = find, old
         self._found: dict[tuple[int, str], _Result] = {}
         self._took, self._at = (0.0, 0.0), -inf

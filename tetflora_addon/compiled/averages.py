@@ -117,8 +117,7 @@ def own_leaf_integrals(
     k = size_tip - 1
 
     def moment(power: int) -> Floats:  # mean of o^power over the interval, exact where it is a point
-        terms = [low ** (power - i) * high**i for i in range(power + 1)]
-        return sum(terms) / (power + 1)
+        return sum([low ** (power - i) * high**i for i in range(power + 1)]) / (power + 1)
 
     first = 1 + 2 * k * moment(1) + k * k * moment(2)
     second = moment(1) + 2 * k * moment(2) + k * k * moment(3)

@@ -475,8 +475,7 @@ def _rays(
             depth = np.stack([np.bincount(ray, held[:, k], len(some)) for k in range(groups + 1)], axis=1)
             total = depth[:, 1:].sum(axis=1)
             use = np.flatnonzero(met[some] | (total > 0))
-            columns = (total / np.sqrt(h), depth[:, 0], total, *depth[:, 1:].T)
-            depth = np.stack(columns, axis=1)[use]
+            depth = np.stack((total / np.sqrt(h), depth[:, 0], total, *depth[:, 1:].T), axis=1)[use]
             yield met[some][use], depth, np.full(len(use), 1 / max(len(use), 1))
 
 

@@ -226,8 +226,7 @@ def catchment(surface: Floats, cell: float) -> Floats:
     steps = np.array([i * wide + j for i, j, _ in _AROUND])
     waits = np.zeros(level.size, np.int64)
     for k, step in enumerate(steps.tolist()):
-        giving = np.flatnonzero(share[k] > 0.0)
-        waits[giving + step] += 1  # each cell once for one direction
+        waits[np.flatnonzero(share[k] > 0.0) + step] += 1  # each cell once for one direction
     area = np.zeros(level.size)
     ready = np.flatnonzero(there.reshape(-1) & (waits == 0))
     while len(ready):

@@ -221,8 +221,7 @@ def _neighbors(level: Branches, own: Integers, plant: Integers, most: float) -> 
     members = int(np.clip(most, 1, _NEIGHBORS))
     for p in np.unique(plant[own]):
         kin = own[plant[own] == p]
-        first = kin[np.argmin(mix(level.key[kin]))]
-        away = np.linalg.norm(level.position[kin] - level.position[first], axis=1)
+        away = np.linalg.norm(level.position[kin] - level.position[kin[np.argmin(mix(level.key[kin]))]], axis=1)
         yield kin[np.argsort(away, kind="stable")[:members]]
 
 

@@ -192,8 +192,7 @@ class LightGrid:
             raise TetFloraError(
                 "The ground is too large for columns this narrow; raise Cell, or choose a smaller ground"
             )
-        row = np.clip(((crowns.y + self.margin) / self.cell).astype(np.int64), 0, self.rows - 1)
-        strip = row // self.strip
+        strip = np.clip(((crowns.y + self.margin) / self.cell).astype(np.int64), 0, self.rows - 1) // self.strip
         order = np.argsort(strip, kind="stable")
         ends = np.searchsorted(strip[order], np.arange(len(self.strips) + 1))
         of_strip = [order[ends[i] : ends[i + 1]] for i in range(len(self.strips))]

@@ -23,6 +23,7 @@ from tetflora_addon.blender.compat import shader_tree
 from tetflora_addon.blender.job import forecast
 from tetflora_addon.blender.placing import populations
 from tetflora_addon.blender.viewport import auto, warnings
+from tetflora_addon.blender.worker import calling
 from tetflora_addon.emission.budget import Estimate
 
 pytestmark = pytest.mark.usefixtures("clean_file")
@@ -167,7 +168,7 @@ def test_many_plants_are_looked_at_one_by_one_between_redraws():
         add_plant(f"plant {number}", location=(0.0, float(number), 0.0))
     add_camera(location=(0.0, -20.0, 1.7)).data.clip_end = 100.0
     bpy.context.view_layer.update()
-    steps = warnings._look_steps(bpy.context.scene, bpy.context.view_layer)
+    steps = warnings._steps(bpy.context.scene, bpy.context.view_layer)
     found, number = [], 0
     try:
         while True:
@@ -239,7 +240,7 @@ def test_nothing_that_the_panel_says_is_cut_in_a_sidebar_of_usual_width(monkeypa
         assert all(blf.dimensions(0, one.value)[0] <= 58.0 for one in button[:1]), button[0].value
     scene, layer = bpy.context.scene, bpy.context.view_layer
     found = Estimate(1, 870_000.0, 1500.0, 13.2 * memory.GIGABYTE, "")
-    monkeypatch.setattr(forecast, "forecast", lambda *_: found)
+    monkeypatch.setattr(forecast, "forecast_steps", lambda *_: calling(lambda: found))
     add_camera()
     said = [forecast.forecast_text(scene, layer), "Not refined: renders show no plants"]
     for names in (["the day or year", "settings"], ["the day or year"], ["settings"]):

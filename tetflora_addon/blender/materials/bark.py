@@ -139,8 +139,7 @@ def place_group() -> bpy.types.NodeTree:
         cylinder = graph.xyz(graph.math('COSINE', u * tau), graph.math('SINE', u * tau), along)
         bump = graph.node("ShaderNodeBump", {"Strength": 1.0, "Distance": _REFERENCE, "Height": u})
         cosine = graph.vector('DOT_PRODUCT', bump, graph.outputs("ShaderNodeNewGeometry")["Normal"])
-        sine = graph.math('SQRT', 1.0 - cosine * cosine)
-        cotangent = cosine / graph.math('MAXIMUM', sine, 1e-3)
+        cotangent = cosine / graph.math('MAXIMUM', graph.math('SQRT', 1.0 - cosine * cosine), 1e-3)
         return {
             "Place": cylinder + graph.attribute("tf_color", "Vector") * _SHIFT,
             "Turn": u,
@@ -480,8 +479,7 @@ def fibrous(graph: Graph, place: Place) -> tuple[Term, Term]:
 def _brows(graph: Graph, eye: Knot) -> Term:
     """1 in the two lines that sink to both sides of a scar as the trunk grows thicker."""
     side = graph.vector('LENGTH', eye.off * (1.0, 1.0, 0.0))
-    line = abs(side * 0.75 + graph.parts(eye.off)[2] - 0.8)
-    return graph.step(line, 0.34, 0.04) * graph.step(side, 2.7, 1.0)
+    return graph.step(abs(side * 0.75 + graph.parts(eye.off)[2] - 0.8), 0.34, 0.04) * graph.step(side, 2.7, 1.0)
 
 
 def smooth(graph: Graph, place: Place) -> tuple[Term, Term]:

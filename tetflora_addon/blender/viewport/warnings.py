@@ -76,16 +76,14 @@ def warned(context: bpy.types.Context) -> list[Warned]:
 def mend(scene: bpy.types.Scene, key: str) -> bool:
     """Mend one of them; whether it was still there."""
     scene.view_layers[0].update()
-    one = next((one for one in run_to_end(_look_steps(scene)) if one.key == key and one.mend is not None), None)
+    one = next((one for one in run_to_end(_steps(scene)) if one.key == key and one.mend is not None), None)
     if one is not None:
         one.mend(scene)
         _outlook.ask()
     return one is not None
 
 
-def _look_steps(
-    scene: bpy.types.Scene, layer: bpy.types.ViewLayer | None = None
-) -> Generator[None, None, list[Warned]]:
+def _steps(scene: bpy.types.Scene, layer: bpy.types.ViewLayer | None = None) -> Generator[None, None, list[Warned]]:
     layer = layer or scene.view_layers[0]
     return list(_look(scene, layer, (yield from _standing(layer))))
 
@@ -288,5 +286,5 @@ def _lift(meters: float, scene: bpy.types.Scene) -> None:
     scene.camera.matrix_world.translation.z += meters
 
 
-_outlook = Outlook(_look_steps)
+_outlook = Outlook(_steps)
 register, unregister = _outlook.register, _outlook.unregister
