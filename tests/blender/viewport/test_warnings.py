@@ -236,7 +236,7 @@ def test_nothing_that_the_panel_says_is_cut_in_a_sidebar_of_usual_width(monkeypa
     given = [call.args for call in calls if getattr(call.func, "id", "") == "Warned"]
     assert len(given) > 10
     for _, short, _, *button in given:
-        assert blf.dimensions(0, f"{short.value} (+2)")[0] <= 110.0, short.value
+        assert blf.dimensions(0, f"{short.value} (+2)")[0] <= 97.0, short.value
         assert all(blf.dimensions(0, one.value)[0] <= 58.0 for one in button[:1]), button[0].value
     scene, layer = bpy.context.scene, bpy.context.view_layer
     found = Estimate(1, 870_000.0, 1500.0, 13.2 * memory.GIGABYTE, "")

@@ -110,7 +110,7 @@ def _look(scene: bpy.types.Scene, layer: bpy.types.ViewLayer, standing: _Standin
         yield Warned("units", "Unit Scale", text, "Set to 1", _setter("unit_settings.scale_length", 1.0))
     if len(place) and settings.refine_at_render and not scene.render.use_lock_interface:
         text = "Lock Interface is off: the window stands still while frames are refined"
-        yield Warned("lock", "Lock Interface", text, "Turn On", _setter("render.use_lock_interface", True))
+        yield Warned("lock", "Lock is off", text, "Turn On", _setter("render.use_lock_interface", True))
     for layer in scene.tetflora.layers:
         if layer.message and not layer.made:
             yield Warned(f"layer {layer.uid}", "No plants", f'"{layer.name}": {layer.message}')
@@ -151,7 +151,7 @@ def _grounds(grounds: list[bpy.types.Object]) -> tuple[list[Warned], list[Warned
             small.append(Warned(f"small {obj.name}", "Small ground", text, "Enlarge", partial(_enlarge, obj)))
         elif obj.parent is None and obj.data.users == 1 and not np.allclose(obj.scale, 1.0, rtol=1e-3):
             text = f'The scale of "{obj.name}" is not applied: textures on it are stretched. Apply makes it 1'
-            stretched.append(Warned(f"scale {obj.name}", "Scale of ground", text, "Apply", partial(_apply, obj)))
+            stretched.append(Warned(f"scale {obj.name}", "Ground scale", text, "Apply", partial(_apply, obj)))
     return small, stretched
 
 
@@ -224,7 +224,7 @@ def _camera(scene: bpy.types.Scene, standing: _Standing, buried: float) -> Itera
     feet, sizes = _crowns(scene, standing, at)
     if buried:
         text = f'"{camera.name}" is below the ground, which hides all. Move lifts it to eye height'
-        yield Warned("below", "Below ground", text, "Move", partial(_lift, buried + _EYE))
+        yield Warned("below", "Too low", text, "Move", partial(_lift, buried + _EYE))
     elif _within(at, feet, sizes):
         text = f'"{camera.name}" is inside a crown: leaves fill the picture. Move takes it to the nearest open place'
         yield Warned("crown", "In a crown", text, "Move", _step_out)
