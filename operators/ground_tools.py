@@ -130,8 +130,7 @@ class GroundTool(Tool):
         region, view = found
         place = (event.mouse_x - region.x, event.mouse_y - region.y)
         origin = view3d_utils.region_2d_to_origin_3d(region, view, place)
-        direction = view3d_utils.region_2d_to_vector_3d(region, view, place)
-        self._hit = self._ground.cast(origin, direction)
+        self._hit = self._ground.cast(origin, view3d_utils.region_2d_to_vector_3d(region, view, place))
         return True
 
     def pushed(self, context: bpy.types.Context, message: str) -> None:

@@ -107,7 +107,7 @@ class TETFLORA_OT_update_layers(_InParts, Operator, label="Update", needs=_ACTIV
         "Layers",
         "Which layers to grow again",
         (
-            ('DUE', "All That Are Due", "All whose settings have changed, and those without plants"),
+            ('DUE', "All That Are Due", "All whose settings or ground have changed, and those without plants"),
             ('ACTIVE', "Active", "The active layer, a biome with all of its layers and its soil, whatever has changed"),
             ('WOOD', "Grown in a Wood", "The active layer, with trees of a dense stand or, again, open-grown ones"),
         ),
@@ -137,8 +137,8 @@ class TETFLORA_OT_update_layers(_InParts, Operator, label="Update", needs=_ACTIV
         uids = [layer.uid for layer in (*layers.children_of(active), active) if layer.kind != BIOME] if one else []
         uids = uids if one else layers.due_layers(scene)
         if not uids:
-            more = "If a ground has changed, choose Update This Layer in the menu beside the list"
-            raise SceneError(f"No setting has changed since the layers were grown. {more}")
+            more = "If a mask, area or path has, choose Update This Layer in the menu beside the list"
+            raise SceneError(f"No setting and no ground has changed since the layers were grown. {more}")
         return (yield from self._each(scene, depsgraph, uids))
 
     def _each(self, scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, uids: list[str]) -> Job[Updated]:
@@ -405,8 +405,7 @@ class TETFLORA_OT_ground_cover(_InParts, Operator, label="Ground Cover", needs=(
 class TETFLORA_OT_grow_stand(ModalJob, Operator, label="Grow Stand", needs=(in_object_mode, ground_found)):
     """Grow a wood on the selected meshes, year by year: plants compete for light, die, fall and come up from seed.
 
-    The result is one field of plants with its whole history. Change the settings of its years, species and site, then
-    use Update.
+    The result is one field of plants with its whole history. Change its years, species and site, then use Update.
     """
 
     def steps(self, context: bpy.types.Context) -> Job[growing.GrownStand]:

@@ -244,8 +244,7 @@ class TETFLORA_OT_edit_list(
             return self.failed(f'There is no list "{self.entries}" of "{self.owner}"; click the buttons beside a list')
         if self.action == 'ADD':
             present = {entry.species for entry in entries}
-            species = next((s for s in catalog() if s not in present), None) or default_species()
-            entries.add().species = species
+            entries.add().species = next((s for s in catalog() if s not in present), None) or default_species()
             setattr(owner, index, len(entries) - 1)
             return {'FINISHED'}
         active = getattr(owner, index)

@@ -147,8 +147,7 @@ class TETFLORA_OT_save_species(
     """
 
     def run(self, context: bpy.types.Context) -> set[str]:
-        path = save_species(context.scene, shown(context))
-        return self.done(f"Saved as {path}")
+        return self.done(f"Saved as {save_species(context.scene, shown(context))}")
 
 
 class TETFLORA_OT_load_species(FileTool, Operator, ImportHelper, label="Load Species"):
@@ -173,8 +172,7 @@ class TETFLORA_OT_export_species(
         return super().invoke(context, event)
 
     def run(self, context: bpy.types.Context) -> set[str]:
-        identifier = shown(context)
-        return self.done(f"Written to {write_species(context.scene, identifier, self.path)}")
+        return self.done(f"Written to {write_species(context.scene, shown(context), self.path)}")
 
 
 class TETFLORA_OT_delete_file(Reporting, Operator, label="Delete from My Files", told="cache", options={'REGISTER'}):

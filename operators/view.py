@@ -231,8 +231,7 @@ def _cover(scene: bpy.types.Scene, height: float, clouds: float, haze: float) ->
     white = Vector((0.8, 0.82, 0.85))
     ramp = next(node for node in nodes if node.type == 'VALTORGB').color_ramp
     for element, color, milky in zip(ramp.elements, (low, high), (0.5 * haze, 0.6 * haze), strict=True):
-        mixed = color.lerp(white, milky).lerp(0.75 * white, clouds)
-        element.color = (*mixed, 1.0)
+        element.color = (*color.lerp(white, milky).lerp(0.75 * white, clouds), 1.0)
     light = min(1.0, 0.25 + 1.3 * sin(height))
     next(node for node in nodes if node.type == 'BACKGROUND').inputs["Strength"].default_value = 0.7 * light
 

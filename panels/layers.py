@@ -180,7 +180,7 @@ def _status(layer: bpy.types.PropertyGroup | None, others: bool) -> str:
     if layer is None:
         return "Select a layer, or click + to add one" if others else "Click + to let something grow"
     if layer.kind != SCATTER:
-        return "Settings have changed: Update" if is_due(layer) else f"{plants_in(layer):,} plants"
+        return "Settings or ground changed: Update" if is_due(layer) else f"{plants_in(layer):,} plants"
     text = points.status(layer)
     few = text.partition(", as ")[0]  # a sidebar of usual width has room for no more
     if points.complaints(layer):

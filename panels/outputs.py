@@ -114,8 +114,7 @@ def _draw_levels(layout: bpy.types.UILayout, scene: bpy.types.Scene) -> None:
     Button("look", 'VIEW_CAMERA', "Look Through Camera", {"where": 'BACK'}).draw(layout)
     if preview is None or preview.levels is None:
         return
-    last = preview.levels.levels[-1].number
-    layout.prop(settings, "level", text=f"Level of {last}", slider=True)
+    layout.prop(settings, "level", text=f"Level of {preview.levels.levels[-1].number}", slider=True)
     layout.prop(settings, "wires")
     row = layout.row()
     row.active = settings.wires

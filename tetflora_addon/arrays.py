@@ -172,8 +172,7 @@ def spread(counts: Integers) -> tuple[Integers, Integers]:
 
 def chunks(counts: NDArray, limit: float) -> Iterator[slice]:
     """Runs of things, of which ``counts`` (n,), perhaps expected ones, sum up to about a limit each."""
-    block = (np.cumsum(counts) / limit).astype(np.int64)
-    edges = np.flatnonzero(np.diff(block)) + 1
+    edges = np.flatnonzero(np.diff((np.cumsum(counts) / limit).astype(np.int64))) + 1
     for start, stop in zip([0, *edges], [*edges, len(counts)], strict=True):
         if stop > start:
             yield slice(int(start), int(stop))
@@ -276,8 +275,7 @@ def unit(a: NDArray) -> NDArray:
 
 def perpendicular(axis: NDArray) -> NDArray:
     """A unit vector (n, 3) across each of unit vectors (n, 3), turned about it as may be."""
-    helper = np.where(np.abs(axis[:, 2:]) < 0.9, [[0.0, 0.0, 1.0]], [[1.0, 0.0, 0.0]])
-    return unit(np.cross(axis, helper))
+    return unit(np.cross(axis, np.where(np.abs(axis[:, 2:]) < 0.9, [[0.0, 0.0, 1.0]], [[1.0, 0.0, 0.0]])))
 
 
 def spiral(z: NDArray, index: NDArray, step: float) -> NDArray:
@@ -371,8 +369,7 @@ class Chunks(Generic[Rows]):
     def take_out(self, rows: Integers) -> Rows:
         """Mark and return rows (k,), ascending, none of which is marked."""
         out, start = [], 0
-        ends = np.cumsum([len(chunk) for chunk in self._chunks])
-        runs = np.split(rows, np.searchsorted(rows, ends[:-1]))
+        runs = np.split(rows, np.searchsorted(rows, np.cumsum([len(chunk) for chunk in self._chunks])[:-1]))
         for (chunk, there), own in zip(self.chunks(), runs, strict=True):
             if len(own):
                 out.append(chunk.take(own - start))

@@ -20,8 +20,7 @@ class MeshBuffers:
 
     positions: Floats32  # (v, 3): vertices, meters, world space
     edge_verts: Integers32  # (e, 2): the two vertices of each edge
-    #: corner_verts and corner_edges, (c,): vertex of each face corner, and the edge that leads from it to the next
-    #: corner.
+    #: corner_verts and corner_edges, (c,): vertex of each face corner, and the edge from it to the next corner.
     corner_verts: Integers32
     corner_edges: Integers32
     face_offsets: Integers32  # (f + 1,): where each face's corners start; the last entry is ``c``

@@ -110,8 +110,7 @@ def allowance(max_memory: float, reserve: float = 0.0) -> float:
     float
         At least `LEAST`, and infinite without a limit. Of a process whose memory is not known the whole limit is left.
     """
-    left = limit(max_memory) - (resident() or 0) - reserve
-    return max(left, LEAST)
+    return max(limit(max_memory) - (resident() or 0) - reserve, LEAST)
 
 
 def give_back() -> None:
@@ -127,8 +126,7 @@ def give_back() -> None:
 
 
 def _unix_total() -> int:
-    machine = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
-    return min([machine, *_container_limits()])
+    return min([os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES"), *_container_limits()])
 
 
 def _container_limits() -> list[int]:

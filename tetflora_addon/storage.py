@@ -35,8 +35,7 @@ Result = TypeVar("Result")
 Found = TypeVar("Found", Floats, None)
 #: Raise it when files are written in another way.
 _FORMAT = 1
-#: All files of a user together take no more than so many bytes; those that were not used for longest go first. Each has
-#: a few kilobytes.
+#: All files of a user take no more than so many bytes, each a few thousand; those not used for longest go first.
 MOST_BYTES = 64 << 20
 #: Entries of the folder that are looked at to make room: whoever fills it must not stop the others.
 _MOST_ENTRIES = 50_000

@@ -8,8 +8,14 @@ from pathlib import Path
 import bpy
 
 sys.path.append(str(Path(__file__).resolve().parent))
+sys.path.append(str(Path(__file__).resolve().parents[2]))
 
-from forest_steps import press_button, running
+from forest_steps import press_button, press_key, running
+
+from devtools.aliases import INSTALLED, alias
+
+alias(INSTALLED)
+from tetflora_addon.blender.biomes import layers  # noqa: E402  (found only now)
 
 
 def steps(ui):
@@ -50,6 +56,9 @@ def steps(ui):
     yield from press_button(ui, "tetflora.update_layers")
     yield from ui.until(lambda: scene.tetflora.layers[0].made < before and not running(ui), 60, "update")
     ui.values["rows"].append((yield from row_of(ui, "tetflora.update_layers")))
+    yield from lift_the_ground(ui)
+    scene = bpy.context.scene
+    ui.values["rows"].append((yield from row_of(ui, "tetflora.update_layers")))
     scene.tetflora.layers[0].shown = False
     yield from ui.picture("hidden")
     ui.values["hidden"] = scene.tetflora.layers[0].collection.hide_viewport
@@ -59,6 +68,35 @@ def steps(ui):
     yield from ui.picture("tool")
     tool = bpy.context.workspace.tools.from_space_view3d_mode('OBJECT')
     ui.values["tool"] = tool.idname
+
+
+def lift_the_ground(ui):
+    """G Z 5, undo, redo, and Update: whether the layer is due, and where its plants are in the end."""
+
+    def due(wanted):
+        yield from ui.until(lambda: layers.is_due(bpy.context.scene.tetflora.layers[0]) == wanted, 30, f"due: {wanted}")
+        ui.values["due"].append(wanted)
+
+    ui.values["due"] = []
+    bpy.ops.object.select_all(action='DESELECT')
+    bpy.data.objects["Grid"].select_set(True)
+    yield from due(False)
+    yield from press_key(ui, 'G')
+    ui.press('Z')
+    yield 0.5
+    ui.type_text("5")
+    yield 0.5
+    ui.press('RET')
+    yield from due(True)
+    yield from ui.picture("lifted")
+    yield from press_key(ui, 'Z', ctrl=True)
+    yield from due(False)
+    yield from press_key(ui, 'Z', ctrl=True, shift=True)
+    yield from due(True)
+    yield from press_button(ui, "tetflora.update_layers")
+    yield from due(False)
+    plants = [obj for obj in bpy.context.scene.objects if obj.tetflora.is_plant]
+    ui.values["lifted"] = [obj.matrix_world.translation.z for obj in plants]
 
 
 def row_of(ui, operator):

@@ -25,6 +25,12 @@ def test_two_clicks_light_the_ground_and_put_the_camera_on_it(seen: dict) -> Non
     assert seen["view"] == 'CAMERA'
 
 
+def test_a_ground_that_is_lifted_makes_its_layer_due_until_undo_or_update(seen: dict) -> None:
+    assert seen["due"] == [False, True, False, True, False]
+    assert len(seen["lifted"]) > 5
+    assert set(seen["lifted"]) == {5.0}
+
+
 def test_rows_never_move(seen: dict) -> None:
     assert min(seen["rows"]) > 0
     assert len(set(seen["rows"])) == 1
@@ -35,6 +41,6 @@ def test_the_eye_hides_and_the_tool_is_in_the_toolbar(seen: dict) -> None:
     assert seen["tool"] == "tetflora.paint_plants"
 
 
-@pytest.mark.parametrize("name", ["add", "scattered", "lit", "hidden", "tool"])
+@pytest.mark.parametrize("name", ["add", "scattered", "lit", "lifted", "hidden", "tool"])
 def test_the_window_was_drawn(seen: dict, pictures: Path, colors: Callable[[Path], int], name: str) -> None:
     assert colors(pictures / "layers" / f"{name}.png") > 200

@@ -120,8 +120,7 @@ class Asset:
     clusters: Clusters  # of c
     samples: SurfaceSamples  # of s
     leaves: AssetKites  # of l: those of a cluster together
-    #: part and face, (f,): part of the source, and face of that part's surface, for each face, those of a cluster
-    #: together.
+    #: part and face, (f,): part of the source, and face of its surface, for each face, those of a cluster together.
     part: Integers32
     face: Integers32
 

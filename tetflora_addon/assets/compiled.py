@@ -256,5 +256,4 @@ def _samples_above(
         )
         picks.append(begin[smallest] + (counts[smallest, 0] if kind else 0) + index)
         owners.append(owner)
-    order = np.argsort(np.concatenate(owners), kind="stable")
-    return samples.take(np.concatenate(picks)[order]), wanted
+    return samples.take(np.concatenate(picks)[np.argsort(np.concatenate(owners), kind="stable")]), wanted

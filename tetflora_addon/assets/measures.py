@@ -67,8 +67,7 @@ def kites_of(
     values, vectors = np.linalg.eigh(spread)
     done = np.cumsum(optical)
     at = (done - optical)[first] + uniform(key_of_seed(number), _PLANE) * area
-    last = np.append(first[1:], len(optical)) - 1
-    pick = np.clip(np.searchsorted(done, at, side="right"), first, last)
+    pick = np.clip(np.searchsorted(done, at, side="right"), first, np.append(first[1:], len(optical)) - 1)
     plane, long = normal[pick], vectors[:, :, 2]
     along = long - np.einsum("ni,ni->n", long, plane)[:, None] * plane
     flat = np.linalg.norm(along, axis=1) < 0.1  # a face across the leaf, as of its rim: any direction will do
@@ -129,16 +128,14 @@ class PatchTable:
 
 def patch_table_of(source: AssetSource, patches: tuple[Patches | None, ...]) -> PatchTable:
     """All patches of the parts of a source, from those of its surfaces."""
-    number = np.array([0 if p is None else len(p) for p in patches])
-    part, patch = spread(number[source.surface])
+    part, patch = spread(np.array([0 if p is None else len(p) for p in patches])[source.surface])
     center, triangles = np.zeros((len(part), 3), np.float32), np.zeros(len(part), np.int32)
     solid, (island, share, width) = np.zeros(len(part), bool), np.zeros((3, len(part)))
     for s, own in enumerate(patches):
         at = np.flatnonzero(source.surface[part] == s)
         if own is not None and len(at):
             matrix = source.matrices[part[at]].astype(np.float32)
-            local = own.center[patch[at]]
-            center[at] = np.einsum("nij,nj->ni", matrix[:, :3, :3], local) + matrix[:, :3, 3]
+            center[at] = np.einsum("nij,nj->ni", matrix[:, :3, :3], own.center[patch[at]]) + matrix[:, :3, 3]
             triangles[at] = np.diff(own.first)[patch[at]]
             solid[at] = own.solid[patch[at]]
             scale = np.cbrt(np.abs(np.linalg.det(matrix[:, :3, :3])))
@@ -278,11 +275,9 @@ def _leaves(run: Run, optical: Floats, normal: Floats) -> AssetKites:
 
 def shared_out(leaf: Floats, wood: Floats, number: int) -> Integers:
     """How many of a number of samples are on leaves and how many on wood (c, 2), by their optical areas (c,)."""
-    total = np.maximum(leaf + wood, 1e-300)
-    on_leaves = np.clip(np.rint(number * leaf / total), FEWEST, number - FEWEST)
+    on_leaves = np.clip(np.rint(number * leaf / np.maximum(leaf + wood, 1e-300)), FEWEST, number - FEWEST)
     on_leaves = np.where(leaf <= 0.0, 0, np.where(wood <= 0.0, number, on_leaves))
-    on_wood = np.where(wood <= 0.0, 0, number - on_leaves)
-    return np.stack([on_leaves, on_wood], axis=1).astype(np.int64)
+    return np.stack([on_leaves, np.where(wood <= 0.0, 0, number - on_leaves)], axis=1).astype(np.int64)
 
 
 def well_spread(counts: Integers) -> tuple[Integers, Integers]:

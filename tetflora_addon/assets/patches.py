@@ -202,8 +202,7 @@ def patches_of(surface: AssetSurface) -> Patches:
             own[at] = own[sorted_]
         new_face = np.diff(surface.face[triangle], prepend=-1) != 0
     number = np.cumsum(new_face) - np.cumsum(new_face)[start][np.cumsum(new_island) - 1]
-    pieces = np.ceil(count / MOST_FACES).astype(np.int64)
-    most = -(-count // pieces)
+    most = -(-count // np.ceil(count / MOST_FACES).astype(np.int64))
     new = new_island | (new_face & (number % most[np.cumsum(new_island) - 1] == 0))
     first = np.append(np.flatnonzero(new), len(triangle))
     owner = np.cumsum(new) - 1
@@ -282,8 +281,7 @@ def _along_a_curve(
     corners = surface.positions[surface.triangles[triangle[at]]].mean(axis=1, dtype=np.float32)
     face = surface.face[triangle[at]]
     # All triangles of a face go where its first one is.
-    head = np.maximum.accumulate(np.where(np.diff(face, prepend=-1) != 0, np.arange(len(at)), 0))
-    corners = corners[head]
+    corners = corners[np.maximum.accumulate(np.where(np.diff(face, prepend=-1) != 0, np.arange(len(at)), 0))]
     low = corners.min(axis=0)
     cell = (corners - low) / max(float((corners.max(axis=0) - low).max()), 1e-30) * ((1 << _BITS) - 1)
     code = np.zeros(len(at), np.int64)
@@ -383,5 +381,4 @@ def _divided(
     runs = np.repeat(np.arange(len(low)), 1 + dividing)
     second = np.diff(runs, prepend=-1) == 0
     new_low = np.where(second, middle[runs], low[runs])
-    new_high = np.where(~second & dividing[runs], middle[runs], high[runs])
-    return order, new_low, new_high, number[runs]
+    return order, new_low, np.where(~second & dividing[runs], middle[runs], high[runs]), number[runs]

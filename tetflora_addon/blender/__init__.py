@@ -6,7 +6,7 @@ from . import main_thread, preferences, properties, runtime, saved_files, transl
 from .biomes import layers, library
 from .cli import command
 from .job import forecast, render, stored_contents
-from .placing import assets
+from .placing import assets, rules
 from .runtime import in_order
 from .species import catalog, edits
 from .viewport import auto, levels, overlay, points, warnings
@@ -33,6 +33,7 @@ register, unregister = in_order(
     points,
     warnings,
     assets,
+    rules,
     layers,
     command,
     translations,

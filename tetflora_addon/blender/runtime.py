@@ -23,6 +23,7 @@ import bpy
 from bpy.app.handlers import persistent
 
 from ..errors import SceneError, readable
+from ..jobs import run_to_end
 from ..processes import pool
 from . import compat
 from .declare import once
@@ -122,30 +123,34 @@ def call_off(function: Callable[[], float | None]) -> None:
 
 
 _Result = TypeVar("_Result")
+#: Seconds of looking between two redraws and as many without, and from a change to the first look.
+_SLICE, _QUIET = 0.01, 0.2
 
 
 class Outlook(Generic[_Result]):
-    """What panels say of a scene, found a moment after a change, and the less often the longer that takes.
+    """What panels say of a scene, found a moment after a change, and the less often the longer the window waits for it.
 
     Of the last two times the shorter counts: at first some is prepared. In the background it is found when asked for.
 
     Parameters
     ----------
     find : callable
-        Finds it for a scene and a view layer.
+        Finds it for a scene and a view layer; or begins small steps to it, which a change ends and begins anew.
     old : float
         Seconds after which a panel that is drawn asks for it anew.
     """
 
-    def __init__(self, find: Callable[[bpy.types.Scene, bpy.types.ViewLayer], _Result], old: float = inf) -> None:
+    def __init__(self, find: Callable[..., _Result | Generator], old: float = inf) -> None:
         self._find, self._old = find, old
         self._found: dict[tuple[int, str], _Result] = {}
         self._took, self._at = (0.0, 0.0), -inf
+        self._steps, self._shown, self._changed, self._longest, self._pause = None, [], False, 0.0, _QUIET
         self._timer = partial(self._look)  # one object, which Blender can find again
 
         def ask(*_: object) -> None:
+            self._changed = True
             if not bpy.app.background:
-                call_soon(self._timer, max(0.2, 30.0 * min(self._took)))
+                call_soon(self._timer, self._pause)
 
         self.ask = ask
         self._handlers = handlers(depsgraph_update_post=ask, undo_post=ask, redo_post=ask, load_post=ask)
@@ -153,27 +158,51 @@ class Outlook(Generic[_Result]):
 
     def of(self, scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer) -> _Result | None:
         """What was found last."""
-        if bpy.app.background:
-            return self._find(scene, view_layer)
         key = scene.session_uid, view_layer.name
-        if key not in self._found or time.perf_counter() - self._at > self._old:
+        if bpy.app.background:
+            return run_to_end(self._all([(scene, view_layer)]))[key]
+        if self._steps is None and (key not in self._found or time.perf_counter() - self._at > self._old):
             self.ask()
         return self._found.get(key)
 
-    def _look(self) -> None:
-        begin, windows = time.perf_counter(), bpy.context.window_manager.windows
-        found = {(w.scene.session_uid, w.view_layer.name): self._find(w.scene, w.view_layer) for w in windows}
-        self._at = time.perf_counter()
-        self._took = self._took[1], self._at - begin
+    def _all(self, shown: list[tuple[bpy.types.Scene, bpy.types.ViewLayer]]) -> Generator:
+        found = {}
+        for scene, layer in shown:
+            one = self._find(scene, layer)
+            found[scene.session_uid, layer.name] = (yield from one) if isinstance(one, Generator) else one
+        return found
+
+    def _look(self) -> float | None:
+        shown = [(window.scene, window.view_layer) for window in bpy.context.window_manager.windows]
+        if self._steps is not None and (self._changed or shown != self._shown):
+            self._steps = None
+            return self._pause
+        if self._steps is None:
+            self._steps, self._shown, self._changed, self._longest = self._all(shown), shown, False, 0.0
+        begin, found = time.perf_counter(), None
+        try:
+            while time.perf_counter() - begin < _SLICE:
+                next(self._steps)
+        except StopIteration as stop:
+            found, self._steps = stop.value, None
+        except ReferenceError:  # deleted, which Blender tells soon
+            self._changed = True
+        now = time.perf_counter()
+        self._longest = max(self._longest, now - begin)
+        if found is None:
+            return _SLICE
+        self._at, self._took = now, (self._took[1], self._longest)
+        self._pause = max(_QUIET, 30.0 * min(self._took))
         if found != self._found:
             self._found = found
             redraw()
+        return None
 
     def unregister(self) -> None:
         """Look no more."""
         self._handlers.unregister()
         call_off(self._timer)
-        self._found = {}
+        self._found, self._steps = {}, None
 
 
 @dataclass(eq=False)

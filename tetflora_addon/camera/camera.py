@@ -200,8 +200,7 @@ class Camera:
             # Toward the poles an image has more pixels for each solid angle.
             cosine = np.hypot(local[..., 0], local[..., 2]) / distance
             return self.pixel_size * self._nearest(distance) * np.sqrt(np.clip(cosine, LEAST_COSINE, 1.0))
-        depth = self.to_camera_space(points)[..., 2]
-        return self.pixel_size * self._nearest(depth - self.setback)
+        return self.pixel_size * self._nearest(self.to_camera_space(points)[..., 2] - self.setback)
 
     @property
     def closest(self) -> float:
@@ -237,8 +236,7 @@ class Camera:
         """
         extent = self.pixel_extent(points)
         if self.kind == "PERSP":
-            away = length(points - self.eye)
-            extent = np.maximum(extent, self.pixel_size * (away - self.cell_radius))
+            extent = np.maximum(extent, self.pixel_size * (length(points - self.eye) - self.cell_radius))
         return extent
 
 
@@ -412,8 +410,7 @@ def silhouette_area(local: Floats, low: Floats, high: Floats, camera: Camera) ->
     mixed = np.flatnonzero(~ahead.all(axis=1) & whole)
     for face, corners in enumerate(FACES):
         area[mixed, face] = _clipped_area(local[mixed[:, None], corners], camera)
-    total = (np.abs(area).sum(axis=1) + np.abs(area.sum(axis=1))) / 2.0
-    return np.where(whole, total, 0.0), whole
+    return np.where(whole, (np.abs(area).sum(axis=1) + np.abs(area.sum(axis=1))) / 2.0, 0.0), whole
 
 
 def _clipped_area(triangles: Floats, camera: Camera) -> Floats:

@@ -117,8 +117,7 @@ def own_leaf_integrals(
     k = size_tip - 1
 
     def moment(power: int) -> Floats:  # mean of o^power over the interval, exact where it is a point
-        terms = [low ** (power - i) * high**i for i in range(power + 1)]
-        return sum(terms) / (power + 1)
+        return sum([low ** (power - i) * high**i for i in range(power + 1)]) / (power + 1)
 
     first = 1 + 2 * k * moment(1) + k * k * moment(2)
     second = moment(1) + 2 * k * moment(2) + k * k * moment(3)
@@ -299,8 +298,7 @@ _BASES = np.linspace(0.0, MOST[BASE], 39)
 _ABSCISSAS = np.polynomial.legendre.leggauss(5)[0]
 _MEANS = np.polynomial.legendre.leggauss(5)[1] / 2
 KINDS = len(LEAF_KINDS)
-#: Columns of totals: area and faces of leaves of each kind, faces and surface of branches, and what of that is of short
-#: shoots.
+#: Columns of totals: area and faces of leaves of each kind, faces and surface of branches, and of short shoots alone.
 _AREA, _LEAF_FACES, _LEAVES = slice(KINDS), slice(KINDS, 2 * KINDS), slice(2 * KINDS)
 _FACES, _WOOD, _SPURS, _TOTALS = range(2 * KINDS, 2 * KINDS + 4)
 _OF_WOOD = ("fixed_faces", "full_faces", "fixed_wood", "full_wood", "spur_wood")
@@ -465,8 +463,7 @@ class DayTotals:
     #: count and faces, (r, k): expected numbers of leaves and of their faces.
     count: Floats
     faces: Floats
-    #: (r,): mean width of what bears the leaves of sub-plants, meters at plant scale 1; without leaves that of the
-    #: branch.
+    #: (r,): mean width of what bears sub-plants' leaves, meters at plant scale 1; without leaves that of the branch.
     twig: Floats
 
     @property

@@ -30,11 +30,9 @@ def _axis_envelope(row: Table) -> tuple[NDArray, NDArray, NDArray, NDArray]:
     joint = np.repeat(_joint_turns(row), [(segments + 1) // 2, segments // 2])
     joint[0] = widest_sway(row) / segments  # the first segment sets out straight, but for the wind
     turn = np.minimum(np.cumsum(joint), np.pi)
-    sideways = np.sin(np.minimum(turn, np.pi / 2)) / segments
-    radius = np.concatenate([[0], np.cumsum(sideways)])
+    radius = np.concatenate([[0], np.cumsum(np.sin(np.minimum(turn, np.pi / 2)) / segments)])
     low = np.concatenate([[0], np.cumsum(np.cos(turn)) / segments])
-    high = np.linspace(0, 1, segments + 1)
-    return radius, low, high, turn
+    return radius, low, np.linspace(0, 1, segments + 1), turn
 
 
 def _joint_turns(row: Table) -> Floats:
@@ -187,8 +185,7 @@ def _unit_bound(rows: Table, index: int, bounds: Floats, raised: bool) -> Floats
             first_fraction, last_fraction = np.tile(np.reshape(among, (2, 1)), _SLABS)
         r, lo, hi = (np.interp(t, knot_t, v) for v in (radius, low, high))
         first = np.minimum((t[:-1] * row["segments"]).astype(int), len(turn) - 1)
-        last = np.minimum((t[1:] * row["segments"]).astype(int), len(turn) - 1)
-        dev = np.maximum(turn[first], turn[last])
+        dev = np.maximum(turn[first], turn[np.minimum((t[1:] * row["segments"]).astype(int), len(turn) - 1)])
         base, variation = child["angle"]
         lean = [base + (child["angle_tip"] - base) * one for one in (first_fraction, last_fraction)]
         most = np.clip(np.maximum(*lean) + variation + dev, 0, np.pi)

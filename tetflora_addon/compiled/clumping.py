@@ -213,8 +213,7 @@ class WoodOutlines:
     def shown(self, direction: Floats) -> Floats:
         """Area (n,) that each part shows in a direction, m²: that of its outline."""
         along = self.ends[:, 1] - self.ends[:, 0]
-        across = along - (along @ direction)[:, None] * direction
-        return self.radii.sum(axis=1) * np.linalg.norm(across, axis=1)
+        return self.radii.sum(axis=1) * np.linalg.norm(along - (along @ direction)[:, None] * direction, axis=1)
 
     def outlines(self, near: Integers, u: NDArray, v: NDArray) -> tuple[NDArray, NDArray, NDArray]:
         """Corners (4 n, 2), first corners and numbers (n,), as `LeafOutlines.outlines`; one quad each."""
@@ -425,8 +424,7 @@ def _plants(rows: Table, first: int, polygons: Floats) -> list[Branches]:
             break
         order = np.argsort(-polygons[grown.row], kind="stable")
         order = order[: (polygons[grown.row] >= 0.5 * polygons[grown.row].max()).sum()]
-        pick = order[(np.arange(min(number, len(order))) * len(order)) // min(number, len(order))]
-        plants = grown.take(pick)
+        plants = grown.take(order[(np.arange(min(number, len(order))) * len(order)) // min(number, len(order))])
     return [plants.take(slice(i, i + 1)) for i in range(len(plants))]
 
 
@@ -477,8 +475,7 @@ def _rays(
             depth = np.stack([np.bincount(ray, held[:, k], len(some)) for k in range(groups + 1)], axis=1)
             total = depth[:, 1:].sum(axis=1)
             use = np.flatnonzero(met[some] | (total > 0))
-            columns = (total / np.sqrt(h), depth[:, 0], total, *depth[:, 1:].T)
-            depth = np.stack(columns, axis=1)[use]
+            depth = np.stack((total / np.sqrt(h), depth[:, 0], total, *depth[:, 1:].T), axis=1)[use]
             yield met[some][use], depth, np.full(len(use), 1 / max(len(use), 1))
 
 

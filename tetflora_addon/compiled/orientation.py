@@ -301,8 +301,7 @@ def _own_leaves(rows: Table, branches: Branches, lines: Axes, turn: Floats, plac
     outward = foliage.outwardness(rows, branches, owner, t)
     light = foliage.leaf_lights(rows, row, key, outward if place is None else np.full(len(t), place))
     frame = foliage.settled(rows, row, frame, light, _UP)
-    size = foliage.leaf_sizes(rows, row, key, outward, t)
-    weight = number * (size * branches.scale[owner]) ** 2
+    weight = number * (foliage.leaf_sizes(rows, row, key, outward, t) * branches.scale[owner]) ** 2
     # F T Fᵀ, summed over the leaves of each branch: their frames side by side.
     left = _product(frame.reshape(-1, 3).astype(np.float64), turn).reshape(-1, 3, 3) * weight[:, None, None]
     left, right = (f.reshape(-1, leaves, 3, 3).swapaxes(1, 2).reshape(-1, 3, 3 * leaves) for f in (left, frame))
@@ -331,8 +330,7 @@ def face_planes(rows: Table, forms: Sequence[Sequence[Sequence[LeafModel]]]) -> 
 
     The third axis is the normal of the face, the second as near as can be to the midrib. Each stands for the same area.
     """
-    own = np.stack([rows["species"], rows["leaf_kind"]], axis=1)
-    kinds, kind = np.unique(own, axis=0, return_inverse=True)
+    kinds, kind = np.unique(np.stack([rows["species"], rows["leaf_kind"]], axis=1), axis=0, return_inverse=True)
     return np.array([_planes_of(forms[s][k]) for s, k in kinds.tolist()])[kind.ravel()]
 
 

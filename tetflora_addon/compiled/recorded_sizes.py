@@ -68,8 +68,7 @@ class Lives:
 class Sizes(Arrays):
     """Sizes of plants (n,), meters in the field's space; 0 is not known."""
 
-    #: height, diameter, width, base: (n,): Of the plant, of its trunk at 1.3 m, mean width of its crown, height of its
-    #: lowest limb
+    #: height, diameter, width, base: (n,): Of the plant, its trunk at 1.3 m, its crown on average, its lowest limb
     height: Floats
     diameter: Floats
     width: Floats
@@ -92,8 +91,7 @@ def ages_of_heights(species: Species, ratio: Floats) -> Floats:
     ages = ages_of(species)
     log_years, found = _heights(ages)
     rising = log_years <= np.log(ages.full if ages.scaled else ages.decline * ages.lifespan)
-    years = np.exp(np.interp(ratio, found[rising], log_years[rising]))
-    return np.where(ratio == 1.0, ages.full, years)
+    return np.where(ratio == 1.0, ages.full, np.exp(np.interp(ratio, found[rising], log_years[rising])))
 
 
 def at_age(species: Species, years: float, dead: float = 0.0, crowded: bool = False) -> Species:
@@ -123,8 +121,7 @@ def crowds(species: Species) -> bool:
 
 def of_dense_stand(species: Species) -> Species:
     """A species as it grows between neighbors."""
-    leafy = replace(species, stand_leaves=max(species.stand_leaves, _LEAFY))
-    return replace(with_habit(leafy, 1.0), habit=0.0)
+    return replace(with_habit(replace(species, stand_leaves=max(species.stand_leaves, _LEAFY)), 1.0), habit=0.0)
 
 
 def sized(
@@ -253,8 +250,7 @@ def _cohort_ages(species: Species, lives: Lives, number: int, full: float) -> Fl
     # The most frequent lives are cohorts, and each plant is of the nearest one.
     cells, count = np.unique(np.rint(life), axis=0, return_counts=True)
     main = cells[np.argsort(-count, kind="stable")[:_COHORTS]]
-    away = np.stack([((life - one) ** 2).sum(axis=1) for one in main])
-    cohort = np.argmin(away, axis=0)
+    cohort = np.argmin(np.stack([((life - one) ** 2).sum(axis=1) for one in main]), axis=0)
     # Mean ages by spans of years, of all records; they only rise.
     lengths = np.diff(np.append(begins, len(own)))
     spans = int((year.max() - year.min()) / _STRETCH) + 1

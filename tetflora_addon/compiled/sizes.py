@@ -579,8 +579,7 @@ def _all_extremes(rows: Table, base: Branches, ways: Floats) -> Floats:
     out = np.zeros(ways.shape[:2])
 
     def meet(owner: Integers, place: Floats) -> None:
-        away = np.einsum("mi,mki->mk", place - base.position[owner], ways[owner])
-        np.maximum.at(out, owner, away)
+        np.maximum.at(out, owner, np.einsum("mi,mki->mk", place - base.position[owner], ways[owner]))
 
     grown = replace(base, plant=np.arange(len(base), dtype=np.int32))
     while len(grown):

@@ -161,8 +161,7 @@ def _fitted_shells(result: Refinement, allowed: float, faces: float) -> Refineme
     spent = np.cumsum(np.maximum(cost[order], 0.0)) + fixed.sum()
     kept = np.zeros(len(explicit), bool)
     kept[order[spent <= allowed]] = True
-    decision = np.where(explicit & ~kept, Decision.PROXY, result.decision).astype(np.int8)
-    return replace(result, decision=decision)
+    return replace(result, decision=np.where(explicit & ~kept, Decision.PROXY, result.decision).astype(np.int8))
 
 
 def _large(result: Refinement) -> Floats:
@@ -413,8 +412,7 @@ def _through(stand: Stand, parts: CrownParts, plant: Integers, extent: Floats) -
     """Layers of leaves (n,) that are drawn beside those that fill pixels: of crowns that are small all are."""
     radius = np.maximum(stand.radius, 1e-9)
     # Of plants that stand for others as well, the leaves of one.
-    area = np.bincount(plant, parts.number * parts.area, len(radius))
-    through = area / (np.pi * radius**2 * stand.number)
+    through = np.bincount(plant, parts.number * parts.area, len(radius)) / (np.pi * radius**2 * stand.number)
     return through[plant] * np.minimum(DETAIL * extent / (2.0 * radius[plant]), 1.0)
 
 
@@ -482,8 +480,7 @@ def expanded_faces(flora: Flora, seeds: Seeds, camera: Camera) -> Iterator[Float
     yield total
     bound = extents(flora, plants)
     across = np.maximum(bound[:, 0], np.abs(bound[:, 1:3]).max(axis=1)) * plants.length
-    away = np.linalg.norm(plants.position - camera.position, axis=1) - across
-    order = np.argsort(away, kind="stable")
+    order = np.argsort(np.linalg.norm(plants.position - camera.position, axis=1) - across, kind="stable")
     detail = LeafDetail(flora, camera)
     rest = order[_ALL:]
     some = rest[np.linspace(0, len(rest) - 1, min(_SOME, len(rest))).round().astype(np.int64)]

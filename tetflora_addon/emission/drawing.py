@@ -395,8 +395,7 @@ class _Tile(Canvas):
                 lost.setdefault(what, []).append((made.take(some), number))
                 continue
             if len(some):
-                size = np.diff(made.face_offsets)[some]
-                facets = _facets_of_faces(corners[some], size, made, some)
+                facets = _facets_of_faces(corners[some], np.diff(made.face_offsets)[some], made, some)
                 lost.setdefault((what[2], ""), []).append((facets, number))
             made = kept_faces(made, ~gone) if gone.any() else made
             if made.polygons:

@@ -96,8 +96,7 @@ class LeafDetail:
         knots = whole.lines.knots[near]
         reach = np.linalg.norm(np.diff(knots, axis=1), axis=2).max(axis=1) / 2.0 + beside[near]
         extent = self._extent(knots.reshape(-1, 3), np.repeat(reach, knots.shape[1])).reshape(len(near), -1).min(axis=1)
-        nearest = self._nearest(extent, reach)
-        out[near] = size[near] / np.maximum(nearest, extent / NEARER) / self.tolerance
+        out[near] = size[near] / np.maximum(self._nearest(extent, reach), extent / NEARER) / self.tolerance
         return out
 
     def _extent(self, points: Floats, reach: Floats | float) -> Floats:
@@ -219,8 +218,7 @@ def explicit_blocks(flora: Flora, result: Refinement, camera: Camera, tolerance:
     for alone in (False, True):
         some = parts.branches.take(np.flatnonzero((inside >= 0.5) & (parts.branch_only == alone)))
         # Front to back, ties by the plants themselves, so that their order in the scene does not matter.
-        away = np.linalg.norm(some.position - camera.eye, axis=1)
-        some = some.take(np.lexsort([some.key, away]))
+        some = some.take(np.lexsort([some.key, np.linalg.norm(some.position - camera.eye, axis=1)]))
         polygons = piece_totals(flora, as_pieces(some)).polygons if alone else flora.face_counts(some)
         runs += [(alone, some.take(run)) for run in chunks(polygons, BLOCK_POLYGONS)]
     yield from _made_in_processes(flora, LeafDetail(flora, camera, tolerance), runs, len(runs) > 1)

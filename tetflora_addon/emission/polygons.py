@@ -135,20 +135,17 @@ def chosen_facets(polygons: Polygons, optical: Floats, side: Floats) -> Facets:
     owner, triangle, _ = polygons.triangles()
     vector, key = meshes.vectors(triangle, polygons.instance[owner]), key_of_seed(polygons.instance)[owner]
     own = np.linalg.norm(vector, axis=1)
-    of_polygon = np.bincount(owner, own, len(polygons))
-    rate = optical / (np.maximum(of_polygon, 1e-300) * np.maximum(side, 1e-12) ** 2)
+    rate = optical / (np.maximum(np.bincount(owner, own, len(polygons)), 1e-300) * np.maximum(side, 1e-12) ** 2)
     pick, number = spread(np.floor(own * rate[owner] + stepped(key, triangle)).astype(np.int64))
 
     thing, triangle = owner[pick], triangle[pick]
     key = child_key(mix(key_of_seed(triangle) ^ key[pick]), number)  # several facets of a triangle lie apart
     corners = meshes.corners(triangle, polygons.instance[thing])
     root, v = np.sqrt(uniform(key, _PLACE_U)), uniform(key, _PLACE_V)
-    at = np.stack([1 - root, root * (1 - v), root * v], axis=1)
-    center = np.einsum("nk,nki->ni", at, corners)
+    center = np.einsum("nk,nki->ni", np.stack([1 - root, root * (1 - v), root * v], axis=1), corners)
     normal = unit(vector[pick])
     edges = np.roll(corners, -1, axis=1) - corners
-    longest = np.linalg.norm(edges, axis=2).argmax(axis=1)
-    along = unit(edges[np.arange(len(pick)), longest])
+    along = unit(edges[np.arange(len(pick)), np.linalg.norm(edges, axis=2).argmax(axis=1)])
     slot = meshes.slot[polygons.face[thing]]
     return Facets(center, np.cross(along, normal), along, side[thing], meshes.colors[slot], meshes.transmission[slot])
 
@@ -249,8 +246,7 @@ def _face_corners(whole: Polygons) -> tuple[Integers, Integers32, Integers]:
     meshes = whole.meshes
     size = meshes.face_size[whole.face]
     owner, index = spread(size)
-    mirrored = meshes.mirrored[whole.instance][owner]
-    index = np.where(mirrored, size[owner] - 1 - index, index)
+    index = np.where(meshes.mirrored[whole.instance][owner], size[owner] - 1 - index, index)
     return meshes.face_start[whole.face][owner] + index, whole.instance[owner], size
 
 

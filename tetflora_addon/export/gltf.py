@@ -203,8 +203,7 @@ def face_normals(mesh: MeshBuffers) -> Floats32:
     owner, corner = triangles(mesh)
     a, b, c = (mesh.positions[corner[:, k]] for k in range(3))
     across = np.cross(b - a, c - a).astype(np.float64)
-    sums = np.stack([np.bincount(owner, across[:, k], mesh.polygons) for k in range(3)], axis=1)
-    return _unit(sums)
+    return _unit(np.stack([np.bincount(owner, across[:, k], mesh.polygons) for k in range(3)], axis=1))
 
 
 def corner_normals(mesh: MeshBuffers) -> Floats32:

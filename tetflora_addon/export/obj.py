@@ -60,7 +60,6 @@ def _write_mesh(file: TextIO, mesh: MeshBuffers, vertex: int, corner: int) -> No
     np.savetxt(file, mesh.attributes["UVMap"][1], "vt %.6g %.6g")
     size = np.diff(mesh.face_offsets)
     for number in np.unique(size).tolist():
-        first = mesh.face_offsets[:-1][size == number]
-        index = first[:, None] + np.arange(number)
+        index = mesh.face_offsets[:-1][size == number][:, None] + np.arange(number)
         both = np.stack([mesh.corner_verts[index] + vertex, index + corner], axis=2).reshape(len(index), -1)
         np.savetxt(file, both, "f" + " %d/%d" * number)

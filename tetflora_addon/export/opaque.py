@@ -86,8 +86,7 @@ def _sides(meshes: Sequence[MeshBuffers]) -> Floats:
             falls = normal[face] @ lamp.toward
             light = bright * np.abs(falls)
             seen = light * np.where(lamp.reaches(place, shadow, _SLACK * cell), 1.0, passing)
-            kinds = np.where(front == (falls > 0.0), np.where(front, 0, 1), 2)
-            np.add.at(found, (kinds, part[face]), seen)
+            np.add.at(found, (np.where(front == (falls > 0.0), np.where(front, 0, 1), 2), part[face]), seen)
             np.add.at(every, part[face], light)
     shaded = 1.0 - found.sum(axis=0) / np.maximum(every, 1e-30)
     return np.column_stack([*(found / np.maximum(found[:2].sum(axis=0), 1e-30)), shaded])

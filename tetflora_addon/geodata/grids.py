@@ -142,8 +142,7 @@ def _usgs(path: Path) -> Raster:
         for _ in range(profiles):
             number = int(content[at + 12 : at + 18])
             x, y, base = (real(at + a, at + a + 24) for a in (24, 48, 72))
-            more = max(number - _FIRST, 0)
-            records = 1 + -(-more // _LATER)
+            records = 1 + -(-max(number - _FIRST, 0) // _LATER)
             if not (0 < number < 70_000 and np.isfinite((x, y, base)).all()) or at + (records - 1) * _RECORD >= len(
                 content
             ):

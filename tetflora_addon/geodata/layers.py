@@ -314,8 +314,7 @@ def _geometry(blob: Any) -> _Feature | None:
         return None
     if not isinstance(blob, bytes) or blob[:2] != b"GP":
         raise ValueError
-    envelope = (0, 32, 48, 48, 64)[blob[3] >> 1 & 7]
-    return None if blob[3] & 16 else _binary(BytesIO(blob[8 + envelope :]))
+    return None if blob[3] & 16 else _binary(BytesIO(blob[8 + (0, 32, 48, 48, 64)[blob[3] >> 1 & 7] :]))
 
 
 def _binary(file: BytesIO, depth: int = 0) -> _Feature | None:
@@ -330,8 +329,7 @@ def _binary(file: BytesIO, depth: int = 0) -> _Feature | None:
     size = 2 + (code >> 31) + (code >> 30 & 1) + (0, 1, 1, 2)[heights]
 
     def points(many: int) -> list[list[float]]:
-        flat = np.frombuffer(file.read(8 * size * many), f"{order}f8")
-        return flat.reshape(many, size)[:, :2].tolist()
+        return np.frombuffer(file.read(8 * size * many), f"{order}f8").reshape(many, size)[:, :2].tolist()
 
     if kind == 1:
         (point,) = points(1)

@@ -34,8 +34,7 @@ _SMALL = 4096  # bytes of world files and files with the name of a coordinate sy
 class Raster:
     """Cells with one value each."""
 
-    #: (h, w): meters, the first row is the first of the file (the northernmost, if ``down`` is); nan where nothing is
-    #: known.
+    #: (h, w): meters, the first row is the file's first (the northernmost, if ``down`` is); nan where none is known.
     values: Floats32
     corner: Floats  # (2,): coordinates of the middle of the first cell of the first row
     #: along and down, (2,): steps from a cell to the next of its row, and to the next row.
@@ -75,8 +74,7 @@ class Raster:
         for y, x in ((j, i), (j, i + 1), (j + 1, i), (j + 1, i + 1)):
             weight = (1.0 - np.abs(column - x)) * (1.0 - np.abs(row - y))
             # What does not count may be nan, and lies beyond a raster of one cell.
-            values = self.values[np.minimum(y, h - 1), np.minimum(x, w - 1)]
-            out += np.where(weight > 0.0, weight * values, 0.0)
+            out += np.where(weight > 0.0, weight * self.values[np.minimum(y, h - 1), np.minimum(x, w - 1)], 0.0)
         return out
 
     def coarser(self, most: int) -> Self:

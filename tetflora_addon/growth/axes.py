@@ -45,8 +45,7 @@ class Axes(Arrays):
         chord = self.knots[:, -1] - self.knots[:, 0]
         direction = chord / np.maximum(np.linalg.norm(chord, axis=1), 1e-300)[:, None]
         between = self.knots[:, 1:-1] - self.knots[:, :1]
-        along = np.einsum("nsi,ni->ns", between, direction)
-        square = np.einsum("nsi,nsi->ns", between, between) - along**2
+        square = np.einsum("nsi,nsi->ns", between, between) - np.einsum("nsi,ni->ns", between, direction) ** 2
         return np.sqrt(np.maximum(square, 0.0).max(axis=1, initial=0.0))
 
     def sky_at(self, branch: Integers, t: Floats) -> Floats | None:
@@ -115,8 +114,7 @@ def _axes(rows: Table, branches: Branches, ahead: float = 0.0) -> Axes:
             back = np.where(2 * s < segments, bend[:, 0], outer_bend) + bend[:, 1] * signed(
                 branches.key, Draw.BEND + 2 * s
             )
-            aside = bend[:, 1] * signed(branches.key, Draw.BEND + 2 * s + 1)
-            frame = _bent(frame, -back, aside)
+            frame = _bent(frame, -back, bend[:, 1] * signed(branches.key, Draw.BEND + 2 * s + 1))
             if len(attracted) == n:
                 frame = _pulled(frame, pull, branches.sky)
             elif len(attracted):
@@ -155,12 +153,10 @@ def _leaned(
     line = rows["knots"][branches.row, 0]
     ground = branches.position - np.einsum("nij,nj->ni", turn, line) * branches.scale[:, None]
     up = turn[:, :, 2]
-    whole = replace(branches, position=ground, frame=turn)
-    rate = sway(rows, whole, ahead) / branches.scale[:, None]
+    rate = sway(rows, replace(branches, position=ground, frame=turn), ahead) / branches.scale[:, None]
     bent = leaned(knots - ground[:, None], up, rate) + ground[:, None]
     axis, rate = axis_and_angle(rate)
-    middle = (knots[:, 1:] + knots[:, :-1]) / 2 - ground[:, None]
-    height = np.maximum(np.einsum("nsi,ni->ns", middle, up), 0.0)
+    height = np.maximum(np.einsum("nsi,ni->ns", (knots[:, 1:] + knots[:, :-1]) / 2 - ground[:, None], up), 0.0)
     segments = height.shape[1]
     axis, angle = np.repeat(axis, segments, axis=0), (rate[:, None] * height).ravel()
     skies = turned_vectors(np.repeat(branches.sky, segments, axis=0), axis, angle).reshape(-1, segments, 3)

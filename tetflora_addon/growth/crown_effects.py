@@ -59,8 +59,7 @@ def are_stools(rows: Table, row: Integers) -> Mask:
 
 def first_forks(rows: Table, row: Integers) -> Floats:
     """Where on the trunks of the plants of rows (n,) the first fork is, fractions of their height; 1 without any."""
-    first = np.flatnonzero(np.diff(rows["species"], prepend=-1))
-    return rows["part"][first[rows["species"]], 1][row]
+    return rows["part"][np.flatnonzero(np.diff(rows["species"], prepend=-1))[rows["species"]], 1][row]
 
 
 def trunk_length_factors(base: ArrayLike, fork: ArrayLike) -> tuple[Floats, Floats]:

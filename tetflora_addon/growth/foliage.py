@@ -312,8 +312,7 @@ def leaf_frames(
         turns += np.where(spray > 0, level, 0.0)
     turns -= np.rint(turns)  # whole turns would cost single precision its last digits
     azimuth = (turns * (2 * np.pi)).astype(np.float32)
-    angle = ranged(rows, "leaf_angle", row, key, Draw.ANGLE).astype(np.float32)
-    out = _leaf_frames(frame, azimuth, angle)
+    out = _leaf_frames(frame, azimuth, ranged(rows, "leaf_angle", row, key, Draw.ANGLE).astype(np.float32))
     return np.where(kind[:, None, None] > 0, inclined(frame, kind, key), out) if kind.any() else out
 
 

@@ -90,8 +90,7 @@ def grow_children(
     power = nodes.power if p == 0 else 1.0
     inside = low < start[0] * now < high
     mean = float(np.clip((start[0] * now - low) / here, 0, 0.999))
-    ends = law.place_of([last - nodes.fresh * (last - first), last])
-    fresh, until = np.clip((ends - low) / here, mean, 1)
+    fresh, until = np.clip((law.place_of([last - nodes.fresh * (last - first), last]) - low) / here, mean, 1)
     variation = min(start[1] * now / here, mean, 0.999 - mean) if inside else 0.0
     starts = mean + variation * _GAUSS  # numbers are not linear in the start, so that their mean is not that of it
     varies = start[1] / start[0] if start[0] > 0 else 0.0
@@ -302,8 +301,7 @@ class DrawnLines:
     segments: Integers  # (b,)
     knots: Floats  # (b, MAX_SEGMENTS + 1, 3): evenly spaced along the branch; beyond its segments the last one again
     radii: Floats  # (b, MAX_SEGMENTS + 1)
-    #: (b, MAX_SEGMENTS, 3, 3): columns are local axes; the third leads along the segment, the others are carried along
-    #: without twist.
+    #: (b, MAX_SEGMENTS, 3, 3): columns are local axes; the third is the segment's, the others go along untwisted.
     frames: Floats
     #: length, radius and outward, (b,): of the whole line; at its base; and where between inside and outside of the
     #: crown it leaves its limb.

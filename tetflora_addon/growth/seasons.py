@@ -190,8 +190,7 @@ class Stages(Arrays):
 
     there: Mask  # (n,): not yet to come and not fallen
     size: Floats  # (n,): over that in summer
-    #: fresh, turned and dead, (n,): how far each has the fresh color, then its color of autumn, and that of dead
-    #: leaves.
+    #: fresh, turned and dead, (n,): how far each has the fresh color, that of autumn, and that of dead leaves.
     fresh: Floats
     turned: Floats
     dead: Floats
@@ -250,8 +249,7 @@ def leaf_table(leaf: LeafYear | None) -> Floats:
         return np.repeat([[1.0], [1.0], [1.0], [0.0], [0.0], [0.0]], len(days), axis=1)
     year = _numbers(leaf)
     some = _DEVIATIONS.reshape(_NODES, -1).mean(axis=1)
-    finer = _DEVIATIONS.reshape(8 * _NODES, -1).mean(axis=1)
-    arrived, size, fresh = _springtime(year, days[:, None], finer)
+    arrived, size, fresh = _springtime(year, days[:, None], _DEVIATIONS.reshape(8 * _NODES, -1).mean(axis=1))
     hangs, turned = _autumntime(year, days[:, None, None], some[:, None], some)
     number, lengths, area, young = ((arrived * v).mean(axis=1) for v in (1.0, size, size**2, size**2 * fresh))
     held, colored = hangs.mean(axis=(1, 2)), (hangs * turned).mean(axis=(1, 2))
@@ -306,10 +304,8 @@ def mean_autumn_colors(year: Table, hue: Floats) -> Floats:
     """Means (n, 3) of the same over the leaves of plants with hues (n,)."""
     number = np.maximum(year["colors"], 1)[:, None]
     first = (_OF_PLANT * hue)[:, None]
-    edges = np.arange(MAX_AUTUMN + 1) / number
-    inside = np.clip(edges, first, first + 1.0 - _OF_PLANT)
-    share = np.diff(inside, axis=1) / (1.0 - _OF_PLANT)
-    return np.einsum("nk,nkc->nc", share, year["autumn"])
+    inside = np.clip(np.arange(MAX_AUTUMN + 1) / number, first, first + 1.0 - _OF_PLANT)
+    return np.einsum("nk,nkc->nc", np.diff(inside, axis=1) / (1.0 - _OF_PLANT), year["autumn"])
 
 
 def is_gone(species: Species, season: Season | None) -> bool:

@@ -96,15 +96,13 @@ class Branches(Arrays):
     plant: Integers32 = column(dtype=np.int32)  # (n,): index of the plant that it belongs to
     key: Keys = column(dtype=np.uint64)  # (n,): hash of the plant's seed and the path of child indices
     position: Floats = column(3)  # (n, 3): base, meters, world space
-    #: (n, 3, 3): columns are the local axes at the base; the branch sets out along the third, the first points away
-    #: from the parent.
+    #: (n, 3, 3): columns are axes at the base; the branch sets out along the third, the first is away from the parent.
     frame: Floats = column(3, 3)
     #: length and radius, (n,): length of the axis and radius at its base, meters.
     length: Floats
     radius: Floats
     scale: Floats  # (n,): scale of the plant, which leaves take as well
-    #: (n,): length as the crown's shape has it here, relative to the longest; numbers of branches and leaves may follow
-    #: it.
+    #: (n,): length by the crown's shape, relative to the longest; numbers of branches and leaves may follow it.
     vigor: Floats
     #: (n,): where it leaves its limb (the branch of order 1), 0 inside the crown to 1 outside; 0 for limbs and trunks
     #: themselves, along which it grows.
@@ -113,8 +111,7 @@ class Branches(Arrays):
     #: wind moves them and does not change how they grow.
     sky: Floats | None = None
     later: Pose | None = None  # position and frame a moment later, where it is asked how plants move
-    #: (n, 2): on a day of the year: the day that it is for the plant, and its place among the autumn colors of its
-    #: species.
+    #: (n, 2): on a day of the year: the day for the plant, and its place among the autumn colors of its species.
     year: Floats | None = None
     #: (n, 6): where plants have crown shapes: what trunks and their stems know of these, see `crown_effects`; of all
     #: others the factor on their length in the first column, that on what they bear in the last, and 0.

@@ -160,8 +160,7 @@ def widest_sway(rows: Table) -> Floats:
     """Largest turn (...) of tips of branches of rows (...) at any time, radians (for those drawn by hand by meter)."""
     if not is_windy(rows):
         return np.zeros(rows.shape)
-    most = np.linalg.norm(_SWAY + [1, 0, 0])
-    return rows["lean"] * (1 + rows["air"]["gusts"]) * most
+    return rows["lean"] * (1 + rows["air"]["gusts"]) * np.linalg.norm(_SWAY + [1, 0, 0])
 
 
 def sway(rows: Table, branches: Branches, ahead: float = 0.0) -> Floats:

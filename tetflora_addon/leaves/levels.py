@@ -402,8 +402,7 @@ def _planes(normals: Floats, areas: Floats) -> list[Integers]:
     values, axes = np.linalg.eigh(np.einsum("f,fi,fj->ij", areas, normals, normals) / areas.sum())
     if values[1] < _FLAT**2:
         return [np.arange(len(areas))]
-    facing = np.where(normals @ axes[:, 2] < 0.0, -1.0, 1.0)
-    order = np.argsort(facing * (normals @ axes[:, 1]), kind="stable")
+    order = np.argsort(np.where(normals @ axes[:, 2] < 0.0, -1.0, 1.0) * (normals @ axes[:, 1]), kind="stable")
     planes = min(_PLANES, len(areas))
     done = np.cumsum(areas[order]) - areas[order] / 2
     group = np.minimum((planes * done / areas.sum()).astype(int), planes - 1)
@@ -417,8 +416,7 @@ def _fan(model: LeafModel) -> tuple[Floats, Floats]:
     points = np.ascontiguousarray(corners.swapaxes(0, 1))
     # Negative where a face is concave; triangles at the ends of a fan have none.
     vectors = np.cross(points[:, 1] - points[:, 0], points[:, 2] - points[:, 0]) / 2
-    area = np.copysign(np.linalg.norm(vectors, axis=1), np.einsum("ti,ti->t", vectors, normals[face]))
-    return points, area
+    return points, np.copysign(np.linalg.norm(vectors, axis=1), np.einsum("ti,ti->t", vectors, normals[face]))
 
 
 def _longer_axis(points: Floats, weight: Floats, normal: Floats) -> NDArray:
@@ -458,8 +456,7 @@ def _kite(model: LeafModel, area: float, normal: Floats, fan: tuple[Floats, Floa
     # Moments of a triangle are complete homogeneous polynomials of its corners.
     variance = max((weight * ((x**2).sum(1) + x.sum(1) ** 2)).sum() / 12, 1e-300)
     third = (x**3).sum(1) + x.prod(1) + (x**2 * (x.sum(1)[:, None] - x)).sum(1)
-    skewness = (weight * third).sum() / 10 / variance**1.5
-    widest = float(np.interp(skewness, _SKEWNESS, _WIDEST))
+    widest = float(np.interp((weight * third).sum() / 10 / variance**1.5, _SKEWNESS, _WIDEST))
     length = np.sqrt(18.0 * variance / (1.0 - widest * (1.0 - widest)))
     tip = (2.0 - widest) / 3.0
     # No longer than the model, or bounds would not hold it; and no needle where it is seen along its longer axis.

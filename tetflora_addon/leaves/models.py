@@ -264,8 +264,7 @@ LEAF_MODELS = {
 """The built-in leaves by name: as species files have leaves, polygons and the outline that they stand for."""
 
 
-#: Angle of all faces around a vertex below which it is a point, and stays: a full turn on flat ground, 4/3 π on an
-#: octahedron.
+#: Angle of all faces around a vertex below which it is a point, and stays: 2 π on flat ground, 4/3 π on an octahedron.
 _POINTED = np.pi
 
 
@@ -278,8 +277,7 @@ def closed_parts(model: LeafModel) -> Integers:
     face = np.repeat(np.arange(model.polygons), np.diff(model.face_offsets))
     order = np.argsort(of_corner, kind="stable")
     paired = np.bincount(of_corner) == 2
-    pairs = face[order][paired[of_corner[order]]].reshape(-1, 2)
-    part = connected(model.polygons, *pairs.T)
+    part = connected(model.polygons, *face[order][paired[of_corner[order]]].reshape(-1, 2).T)
     return np.where(np.isin(part, part[face[~paired[of_corner]]]), -1, part)
 
 

@@ -93,8 +93,7 @@ class Blade:
             found.append(y if self.palmate else np.arccos(np.clip(1.0 - 2.0 * y, -1.0, 1.0)) / np.pi)
         if self.palmate and self.lobes:
             tips, _ = self._palm()
-            angle = np.concatenate([tips, (tips[1:] + tips[:-1]) / 2])
-            found.append(1.0 - angle / self._most_angle())
+            found.append(1.0 - np.concatenate([tips, (tips[1:] + tips[:-1]) / 2]) / self._most_angle())
         elif self.lobes:
             fine = np.linspace(0.0, 1.0, 2049)
             phase = self._lobe_phase(self._height(fine), side)
@@ -150,8 +149,7 @@ class Blade:
         if self.lobes:
             phase = self._lobe_phase(y, side)
             rounded = np.clip((1.0 + np.cos(2.0 * np.pi * phase)) / 2.0, 0.0, 1.0) ** 0.45
-            pointed = np.abs(2.0 * (phase % 1.0) - 1.0)
-            lobe = self.lobe_round * rounded + (1.0 - self.lobe_round) * pointed
+            lobe = self.lobe_round * rounded + (1.0 - self.lobe_round) * np.abs(2.0 * (phase % 1.0) - 1.0)
             length = length * (1.0 - self.lobe_depth * (1.0 - lobe) * np.clip(4.0 * y, 0.25, 1.0))
         return length, ray
 
@@ -203,8 +201,7 @@ class Blade:
         length = (self.lobe_round * rounded + (1.0 - self.lobe_round) * pointed) * (1.0 + bulge * (place % 0.5))
         if not self.lobes:
             length = lengths[0] + (lengths[-1] * 0.8 - lengths[0]) * np.sin(angle / most * np.pi / 2) ** 2
-        ramp = np.clip(s / 0.05, 0.0, 1.0)
-        return length * ramp, np.stack([np.sin(angle), np.cos(angle)], axis=1)
+        return length * np.clip(s / 0.05, 0.0, 1.0), np.stack([np.sin(angle), np.cos(angle)], axis=1)
 
     def _teeth(self, s: Floats) -> Floats:
         """Heights (n,) of teeth over the mean margin, lower toward both ends."""
@@ -248,8 +245,7 @@ def traced(blade: Blade, side: int, tolerance: float) -> Floats:
         ends = blade.margin(s, side)
         between = s[:-1, None] + np.diff(s)[:, None] * checked
         points = blade.margin(between.ravel(), side).reshape(*between.shape, 2)
-        off = distance_to_links(points, ends[:-1, None], ends[1:, None]).max(axis=1)
-        split = off > tolerance / 2.0
+        split = distance_to_links(points, ends[:-1, None], ends[1:, None]).max(axis=1) > tolerance / 2.0
         if not split.any():
             break
         s = np.sort(np.concatenate([s, between[split, 1]]))

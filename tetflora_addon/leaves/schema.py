@@ -125,9 +125,7 @@ def _read_leaflet(reader: FileReader, data: Any, where: str) -> Blade:
 
 def outlined_model(shape: Blade | Needles | Compound) -> LeafModel:
     """The coarsest level of an outline that has no other: few faces, which show as much as the outline."""
-    tolerance = TOLERANCES[0]
-    area = shown_area(shape, surface_of(shape, TOLERANCES[2], 0.0))
-    made = fitted(shape, tolerance, area, amount=0.0)
+    made = fitted(shape, TOLERANCES[0], shown_area(shape, surface_of(shape, TOLERANCES[2], 0.0)), amount=0.0)
     return LeafModel(
         np.round(made.positions[0], 6), made.corner_verts, made.face_offsets, made.uv.astype(np.float32), shape=shape
     )

@@ -226,8 +226,7 @@ def _shoot(needles: Needles, number: int, tolerance: float, factor: float) -> Le
     out = np.stack([side / size, zero, up / size], axis=2)
     if needles.bundle > 1:  # needles of a bundle lean apart
         apart = 2.0 * np.pi * within / needles.bundle
-        other = np.stack([-out[..., 2], zero, out[..., 0]], axis=2)
-        out = out + 0.3 * (np.cos(apart)[:, None] * other)
+        out = out + 0.3 * (np.cos(apart)[:, None] * np.stack([-out[..., 2], zero, out[..., 0]], axis=2))
         angle = angle + 0.12 * np.sin(apart)
     axis = np.array([0.0, 1.0, 0.0])
     cos, sin = np.cos(angle)[..., None], np.sin(angle)[..., None]

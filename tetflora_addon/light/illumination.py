@@ -191,8 +191,7 @@ class Illumination:
         """
         count = len(self.clouds)
         points, cells, sheets, keys = self.sheets.samples(self.clouds)
-        up = np.array([[0.0, 0.0, 1.0]])
-        bright = scattering.irradiance(self._world.parts.sum(axis=0)[None], up)[0]
+        bright = scattering.irradiance(self._world.parts.sum(axis=0)[None], np.array([[0.0, 0.0, 1.0]]))[0]
         for lit in self.lamps:
             if lit.light.kind == "SUN":
                 bright += lit.light.color * max(-lit.light.direction[2], 0.0)

@@ -198,8 +198,7 @@ class SurfaceElements:
         counts = np.bincount(self.cell, minlength=len(clouds))
         cell, place = spread(counts)
         # Evenly among those of a tetrahedron, in whatever order they come.
-        most = int(np.clip(ALL_SAMPLES // max(len(clouds), 1), 1, SAMPLES))
-        step = np.maximum(-(-counts[cell] // most), 1)
+        step = np.maximum(-(-counts[cell] // int(np.clip(ALL_SAMPLES // max(len(clouds), 1), 1, SAMPLES))), 1)
         chosen = order[(place % step == 0) & self.replaced[cell]]
         middle = self.corners[chosen].mean(axis=1)
         nearest = np.argmax(clouds.weights(middle, self.cell[chosen]), axis=1)

@@ -121,8 +121,7 @@ def light_on(sheet: Sheet, canopy: Canopy) -> Generator[float, None, Floats]:
                 v = aside / wide[owner, None]
                 a = (v * v).sum(axis=1) + 1.0 / half[owner] ** 2
                 b = (u * v).sum(axis=1)
-                inside = b * b - a * ((u * u).sum(axis=1) - 1.0)
-                chord = 2.0 * np.sqrt(np.maximum(inside, 0.0)) / a / cosine
+                chord = 2.0 * np.sqrt(np.maximum(b * b - a * ((u * u).sum(axis=1) - 1.0), 0.0)) / a / cosine
                 depth += np.bincount(cell, thick[owner] * chord, minlength=len(depth))
                 yield done
             light += weight / number * np.exp(-depth)
@@ -155,8 +154,7 @@ def fallen_on(sheet: Sheet, canopy: Canopy, kinds: int) -> Generator[float, None
 Suits = Callable[[Floats], Floats]
 
 _PATCHES = 2**34  # keys of patches, away from those of plants and clumps
-#: Fallen leaves that cover ground as far as it is covered at all, m² on a square meter; wood lies where they do, but is
-#: spread wider.
+#: Fallen leaves that cover ground as far as it ever is, m² on a square meter; wood lies there too, but spread wider.
 _LEAVES, _WOOD = 1.2, 3.0
 #: Fraction of low plants that dense litter smothers.
 _SMOTHERED = 0.45

@@ -364,8 +364,7 @@ def _part(weights: Floats, species: int, rules: Rules) -> float:
         return float(fractions[species])
     exact = fractions * rules.count
     whole = np.floor(exact)
-    order = np.argsort(-(exact - whole), kind="stable")
-    whole[order[: round(rules.count - whole.sum())]] += 1.0
+    whole[np.argsort(-(exact - whole), kind="stable")[: round(rules.count - whole.sum())]] += 1.0
     return float(whole[species])
 
 

@@ -81,8 +81,7 @@ class Lines:
         self.low, self.cell = low, cell
         self.columns, self.rows = (np.floor(span / cell).astype(np.int64) + 1).tolist()
         first = self._column_row(np.minimum(start, end) - reach[:, None])
-        last = self._column_row(np.maximum(start, end) + reach[:, None])
-        wide = last - first + 1
+        wide = self._column_row(np.maximum(start, end) + reach[:, None]) - first + 1
         piece, offset = spread(wide.prod(axis=1))
         place = first[piece] + np.stack([offset % wide[piece, 0], offset // wide[piece, 0]], axis=1)
         number = place[:, 1] * self.columns + place[:, 0]

@@ -106,8 +106,7 @@ def height_grid(triangles: Floats, cell: float) -> HeightGrid:
         owner, offset = spread(number[run])
         own = run.start + owner
         _draw(corners, slope, own, lowest[own] + offset, columns, top)
-    height = np.where(np.isneginf(top), np.nan, top).reshape(rows, columns)
-    return HeightGrid(west, south, cell, height)
+    return HeightGrid(west, south, cell, np.where(np.isneginf(top), np.nan, top).reshape(rows, columns))
 
 
 _HAIR = 1e-9  # of a cell: middles on a border belong to both sides
@@ -121,8 +120,7 @@ def _planes(corners: Floats) -> tuple[Floats, Mask]:
     upright = np.abs(area) > 1e-12 * np.maximum(size * size, 1e-12)
     area = np.where(upright, area, 1.0)
     east = (u[:, 2] * v[:, 1] - v[:, 2] * u[:, 1]) / area
-    north = (v[:, 2] * u[:, 0] - u[:, 2] * v[:, 0]) / area
-    return np.stack([east, north], axis=1), upright
+    return np.stack([east, (v[:, 2] * u[:, 0] - u[:, 2] * v[:, 0]) / area], axis=1), upright
 
 
 def _draw(corners: Floats, slope: Floats, own: Integers, row: Integers, columns: int, top: Floats) -> None:
@@ -141,8 +139,7 @@ def _draw(corners: Floats, slope: Floats, own: Integers, row: Integers, columns:
     met = left <= right
     own, row, left, right = own[met], row[met], left[met], right[met]
     first = np.clip(np.ceil(left - _HAIR), 0, columns).astype(np.int64)
-    last = np.clip(np.floor(right + _HAIR), -1, columns - 1).astype(np.int64)
-    number = np.maximum(last - first + 1, 0)
+    number = np.maximum(np.clip(np.floor(right + _HAIR), -1, columns - 1).astype(np.int64) - first + 1, 0)
     for run in chunks(number, _ENTRIES):
         owner, offset = spread(number[run])
         span = run.start + owner
@@ -229,8 +226,7 @@ def catchment(surface: Floats, cell: float) -> Floats:
     steps = np.array([i * wide + j for i, j, _ in _AROUND])
     waits = np.zeros(level.size, np.int64)
     for k, step in enumerate(steps.tolist()):
-        giving = np.flatnonzero(share[k] > 0.0)
-        waits[giving + step] += 1  # each cell once for one direction
+        waits[np.flatnonzero(share[k] > 0.0) + step] += 1  # each cell once for one direction
     area = np.zeros(level.size)
     ready = np.flatnonzero(there.reshape(-1) & (waits == 0))
     while len(ready):

@@ -198,8 +198,7 @@ def colors_of(level: Level, mode: str, deepest: int) -> Floats32:
     if mode == "VISIBILITY":
         return ramp(level.visibility)
     if mode == "CONTRIBUTION":
-        pixels = np.maximum(level.contribution, _LEAST)
-        return ramp(np.log(pixels / _LEAST) / np.log(_MOST / _LEAST))
+        return ramp(np.log(np.maximum(level.contribution, _LEAST) / _LEAST) / np.log(_MOST / _LEAST))
     if mode == "FORM":
         table = np.zeros((len(Decision), 3), np.float32)
         for decision, color in FORMS.items():
@@ -247,8 +246,7 @@ class Projected:
     corners: Floats
     opacity: Floats  # (n,): of the thick point: 1 − e^(−κ · thickness)
     thickness: Floats  # (n,): along that ray, meters
-    #: (m, 3): corners of triangles, counted through all tetrahedra (five each); those of one follow one another. They
-    #: face either way.
+    #: (m, 3): corners of triangles that face either way, through all tetrahedra (five each), one after another.
     triangles: Integers32
 
 
@@ -292,15 +290,13 @@ def project(vertices: Floats, extinction: Floats, camera: Camera) -> Projected:
     reach = np.einsum("snk,nkj->snj", sides, vertices - origin[:, None])
     reach /= np.where(total > 0.0, total, 1.0)[:, :, None]
     toward = -camera.frame[:, 2]
-    first = (reach[0] @ toward > reach[1] @ toward).astype(np.intp)
-    front = reach[first, np.arange(len(vertices))] + origin
+    front = reach[(reach[0] @ toward > reach[1] @ toward).astype(np.intp), np.arange(len(vertices))] + origin
     thickness = np.linalg.norm(reach[0] - reach[1], axis=1)
     # What has no volume has neither thickness nor triangles.
     flat = (total <= 0.0).any(axis=0)
     thickness = np.where(flat, 0.0, thickness)
     front[flat] = vertices[flat, 0]
-    case = (weights >= 0.0) @ np.array([1, 2, 4, 8])
-    triangles = _CASES[np.where(flat, 0, case)]
+    triangles = _CASES[np.where(flat, 0, (weights >= 0.0) @ np.array([1, 2, 4, 8]))]
     owner, which = np.nonzero(triangles[:, :, 0] != _NONE)
     corners = np.concatenate([vertices, front[:, None]], axis=1)
     indices = triangles[owner, which] + 5 * owner[:, None]

@@ -197,16 +197,14 @@ def nearest(shapes: Shapes, eye: Floats, most: int = MOST_FACES) -> tuple[Shapes
     size = crowns.forms[:, 1] ** 2 / np.maximum(np.einsum("ni,ni->n", away, away), 1e-6)
     some = np.argpartition(size, -most)[-most:] if len(size) > most else np.arange(len(size))
     some = some[np.argsort(-size[some])]  # the nearest hide what is drawn after them, which then costs little
-    least = float(np.sqrt(size[some].min(initial=np.inf)))
-    return with_faces(shapes, some), least
+    return with_faces(shapes, some), float(np.sqrt(size[some].min(initial=np.inf)))
 
 
 def with_faces(shapes: Shapes, some: Integers | slice = slice(None)) -> Shapes:
     """Points, or some (k,) of them, as crowns and trunks with faces."""
     crowns = shapes.crowns
     looks, forms, up = crowns.looks[crowns.kinds[some]], crowns.forms[some], crowns.axes[some]
-    along = np.where(np.abs(up[:, :1]) < 0.9, [1.0, 0.0, 0.0], [0.0, 1.0, 0.0])
-    across = np.cross(up, along)
+    across = np.cross(up, np.where(np.abs(up[:, :1]) < 0.9, [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]))
     across /= np.linalg.norm(across, axis=1, keepdims=True)
     frame = np.stack([across, np.cross(up, across), up], axis=2)
     widths = looks[:, 3:4] * forms[:, 2:]
@@ -244,8 +242,7 @@ def thinned(seeds: Seeds, heights: Floats, most: int = MOST_PLANTS) -> Seeds:
     falling = np.sort(np.partition(size, -most)[-most:])[::-1]
     rest = size.sum() - np.cumsum(falling) + falling
     whole = int(np.argmax((most - np.arange(most)) * falling <= rest))  # so many are all shown
-    share = np.minimum(size * ((most - whole) / rest[whole]), 1.0)
-    places = np.floor(np.cumsum(share))
+    places = np.floor(np.cumsum(np.minimum(size * ((most - whole) / rest[whole]), 1.0)))
     return seeds.take(np.sort(order[np.diff(places, prepend=0.0) > 0.0]))
 
 

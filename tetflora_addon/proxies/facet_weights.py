@@ -221,8 +221,7 @@ def _neighbors(level: Branches, own: Integers, plant: Integers, most: float) -> 
     members = int(np.clip(most, 1, _NEIGHBORS))
     for p in np.unique(plant[own]):
         kin = own[plant[own] == p]
-        first = kin[np.argmin(mix(level.key[kin]))]
-        away = np.linalg.norm(level.position[kin] - level.position[first], axis=1)
+        away = np.linalg.norm(level.position[kin] - level.position[kin[np.argmin(mix(level.key[kin]))]], axis=1)
         yield kin[np.argsort(away, kind="stable")[:members]]
 
 
@@ -429,8 +428,7 @@ SHARES = (1.0, 0.4, 0.1, 0.0)
 #: Leaves over those with which plants were measured, up to which the inverse of weights goes on in a line.
 DENSEST = 4.0
 #: Power of how dense a narrow crown is with which its limbs are. With .5, refined oak woods are a fifth too dark inside
-#: (``python -m benchmarks light_inside``); with 1, limbs of beeches let up to a third more through than
-#: their leaves.
+#: (``python -m benchmarks light_inside``); with 1, limbs of beeches let up to a third more through than their leaves.
 _IN_LIMBS = 0.75
 #: Ages of which weights are measured: fractions of the full one, of the lifespan, and years after death.
 _YOUNG, _OLD, _DEAD = (0.04, 0.1, 0.25, 0.5), (0.9, 0.995), (1.0, 8.0, 30.0)
@@ -527,8 +525,7 @@ def weights_of(flora: Flora, number: int, states: tuple[int, ...], known: Known)
     for state in sorted({*states} - {0}):
         # Leaves that are gone change as much of what hides behind others as when the plant is full-grown.
         all_leaves, some = inverse(full), inverse(with_leaves(full.species[0], SHARES[state]))
-        hidden = np.maximum(all_leaves - 1.0, 0.05)
-        left = np.clip((some - all_leaves) / hidden, -1.0, 0.5)
+        left = np.clip((some - all_leaves) / np.maximum(all_leaves - 1.0, 0.05), -1.0, 0.5)
         out[:, state] = 1.0 / np.clip(
             grown + left * np.maximum(grown - 1.0, 0.05), 1.0 / _HIGHEST_WEIGHT, 1.0 / _LOWEST_WEIGHT
         )
@@ -556,8 +553,7 @@ def _alike(rows: Table, other: Table) -> Integers:
         own, there = np.flatnonzero(rows["order"] == order), np.flatnonzero(other["order"] == order)
         if not len(there):  # none of these branches yet, or no more
             there = np.flatnonzero(other["order"] <= order)[-1:]
-        middle = other["part"][there].mean(axis=1)
-        away = np.abs(rows["part"][own].mean(axis=1)[:, None] - middle)
+        away = np.abs(rows["part"][own].mean(axis=1)[:, None] - other["part"][there].mean(axis=1))
         out[own] = there[np.argmin(away, axis=1)]
     return out
 

@@ -26,8 +26,7 @@ from ..refinement.lights import Light
 _RECOLLISION = 0.62
 #: Fraction of its box that a crown fills.
 _FILLED = 0.6
-#: Mean chord of a sheet over the root of its area: .89 of a disc that faces the eye, two thirds of that of one that may
-#: face any way.
+#: Mean chord of a sheet over the root of its area: .89 of a disc that faces the eye, two thirds of it facing any way.
 _CHORD = 0.6
 #: What is seen is lit once and again by all the rest, of which a part is seen too: between the first power of the light
 #: that is scattered once, were only these surfaces to change, and the second, were all to.

@@ -229,8 +229,7 @@ def _turned(base: Floats, again: Integers, some: Integers) -> None:
 def _leaves_of_subplants(flora: Flora, subplants: Branches, rules: FacetRules) -> Facets:
     rows, points = flora.rows, flora.samples.leaves
     one, all_ = flora.one_leaf_area(subplants), flora.leaf_areas(subplants)
-    facet = np.maximum(rules.leaf**2, one)
-    made = facet_sites(subplants.key, all_, facet, *_PATHS[True], rules.explicit)
+    made = facet_sites(subplants.key, all_, np.maximum(rules.leaf**2, one), *_PATHS[True], rules.explicit)
     made = _at_samples(flora, points, subplants, made)
     frame = products(made.frame, gathered(points.frame, made.sample).astype(np.float64))
     frame = settled(rows, made.row, frame, points.light[made.sample].astype(np.float64), _SKY)
@@ -290,8 +289,7 @@ def _leaves_of_pieces(
         shown, number = flora.day.left(branches, rows["leaf_kind"][row], AREA, PRESENT)
         one = one * shown / np.maximum(number, 1e-300)
     facet, areas = np.maximum(rules.leaf**2, one), piece_leaves(flora, pieces)[1]
-    start = leaf_start(rows, branches)
-    made = _along(flora, pieces, areas, facet, start, True, rules.explicit)
+    made = _along(flora, pieces, areas, facet, leaf_start(rows, branches), True, rules.explicit)
     if whole is None:
         bearers = np.flatnonzero(np.bincount(made.owner, minlength=len(branches)))  # many pieces get no facet
         own, of = branches.take(bearers), np.searchsorted(bearers, made.owner)

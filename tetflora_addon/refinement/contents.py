@@ -147,8 +147,7 @@ class PlantParts(Arrays):
         bound = extents(flora, branches, farthest=False)
         extent = np.maximum(2.0 * bound[:, 0], bound[:, 2] - bound[:, 1]) * branches.length
         # Leaves of a solid have places of their own, however few of them are asked for.
-        alone = are_solids(flora.rows)[branches.row]
-        return cls(branches, alone, subplant_totals(flora, branches), extent)
+        return cls(branches, are_solids(flora.rows)[branches.row], subplant_totals(flora, branches), extent)
 
     @classmethod
     def of_branches(cls, flora: Flora, branches: Branches) -> Self:

@@ -114,8 +114,7 @@ def decide(cells: Terminals, transmittance: Floats, settings: RefinementSettings
     no_gain = few | ((cells.pixels <= settings.block**2) & ~crossing)
     small = (contributions(cells, transmittance) <= settings.cutoff**2) & ~crossing
     # Facets take their places from the plants, not from their tetrahedra, which only tell how much is seen.
-    facets = np.isinf(settings.proxy_block)
-    done = small | (no_gain & (cells.pixels <= settings.block**2)) if facets else small
+    done = small | (no_gain & (cells.pixels <= settings.block**2)) if np.isinf(settings.proxy_block) else small
     out = np.full(len(holds), Decision.SPLIT, dtype=np.int8)
     # Large leaves never become a proxy: a barely visible block of them is divided until its hidden parts show.
     out[done & ~large_leaves & (cells.longest_edge_px <= settings.proxy_block)] = Decision.PROXY

@@ -97,8 +97,7 @@ class Statistics:
     seconds: dict[str, float] = field(default_factory=dict)
     memory_mb: float = 0.0  # estimated megabytes of the meshes in Blender
     steps: list[Step] = field(default_factory=list)  # one for each pass through the loop
-    #: Objects that were left out at least in part, because they are far beyond all others, and how far from the camera
-    #: that is, meters.
+    #: Objects of which some was left out, as it is far beyond all others, and how far from the camera, meters.
     outliers: dict[str, float] = field(default_factory=dict)
     unknown: str = ""  # tells of plants that were left out because nobody has their species
 
@@ -153,8 +152,7 @@ _NONE = np.zeros(0, np.int64)
 class Outliers:
     """What is left out of a scene."""
 
-    #: plants, assets and instances, (k,), (l,) and (m,): rows of the seeds, of instances of assets, and instances of
-    #: other meshes.
+    #: plants, assets, instances, (k,), (l,), (m,): rows of seeds, of instances of assets, and of those of other meshes.
     plants: Integers = field(default_factory=lambda: _NONE)
     assets: Integers = field(default_factory=lambda: _NONE)
     instances: Integers = field(default_factory=lambda: _NONE)

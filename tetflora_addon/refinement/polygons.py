@@ -40,16 +40,14 @@ class Surface:
     triangles: Integers32
     material: Integers32  # (f,): slot of each face
     colors: Floats  # (s, 3): mean color of each slot's material, linear RGB
-    #: transmission and coverage, (s,): fraction of scattered light that passes through, and of the surface that is
-    #: opaque.
+    #: transmission and coverage, (s,): fraction of scattered light that passes, and of the surface that is opaque.
     transmission: Floats
     coverage: Floats
     solid: Mask  # (f,): the face belongs to a nearly closed surface, of which half is never seen; see `assets.patches`
     #: (f,): the face is a good part of one of many similar things, such as leaves; several may be drawn as one.
     leaf: Mask
     width: Floats  # (f,): width of the feature that the face belongs to, in the mesh's own units
-    #: mapping of str to (c, k): interpolated across faces: texture coordinates (k = 2), colors and vectors (k = 3),
-    #: numbers (k = 1).
+    #: str to (c, k), interpolated across faces: texture coordinates (k = 2), colors and vectors (3), numbers (1).
     attributes: Mapping[str, Floats32] = field(default_factory=dict)
     normals: Floats32 | None = None  # (c, 3): of corners where any face is smooth, in the mesh's own space
     look: str = ""  # what stands for surfaces with different ones is kept apart

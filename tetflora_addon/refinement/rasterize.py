@@ -174,8 +174,7 @@ def _within(
         else:
             np.minimum(most, value, out=most)
     hit = np.flatnonzero(most > least)
-    row = np.repeat(np.arange(len(rows.wide)), rows.wide)[hit]
-    return row, column[hit], (least[hit], most[hit])
+    return np.repeat(np.arange(len(rows.wide)), rows.wide)[hit], column[hit], (least[hit], most[hit])
 
 
 def _rows(box: Integers, which: Integers) -> Iterator[_Rows]:

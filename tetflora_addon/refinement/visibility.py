@@ -242,8 +242,7 @@ def face_cameras(camera: Camera, side: int) -> list[Camera]:
 
 def pixels_per_solid_angle(camera: Camera, directions: Floats) -> Floats:
     """Pixels (n,) of a panorama for each steradian around directions (n, 3) in world space; 0 beside the image."""
-    local = (directions @ camera.frame) * np.array([1.0, 1.0, -1.0])
-    longitude, latitude = camera.longitude_latitude(local)
+    longitude, latitude = camera.longitude_latitude((directions @ camera.frame) * np.array([1.0, 1.0, -1.0]))
     left, right, bottom, top = camera.window
     seen = (longitude >= left) & (longitude <= right) & (latitude >= bottom) & (latitude <= top)
     return np.where(seen, 1.0 / (camera.pixel_size**2 * np.maximum(np.cos(latitude), LEAST_COSINE)), 0.0)
@@ -291,8 +290,7 @@ class PanoramaBuffer:
             self._weight[number, cells[some]] = outline.pixels
             pixels[some] += outline.pixels
             opacity[some] += outline.pixels * outline.opacity
-        outside = self.camera.distance_to_view(vertices.reshape(-1, 3)).reshape(-1, 4)
-        whole = (outside <= 0.0).all(axis=1)
+        whole = (self.camera.distance_to_view(vertices.reshape(-1, 3)).reshape(-1, 4) <= 0.0).all(axis=1)
         return Outline(pixels, opacity / np.where(pixels > 0.0, pixels, 1.0), whole)
 
     def remove(self, chosen: Mask) -> None:
@@ -332,8 +330,7 @@ def widened_for(
     capsules = bounding_capsules(flora, subplants)
     reach = np.hypot(capsules[6] + capsules[8], capsules[7] + capsules[8])
     reach = np.concatenate([reach, np.zeros(len(polygons)), assets.reach])
-    center = np.concatenate([capsules[:3].T, polygons.center, assets.center])
-    across, up = blur_margins(camera, center, reach)
+    across, up = blur_margins(camera, np.concatenate([capsules[:3].T, polygons.center, assets.center]), reach)
     return camera.widened(margin + across, margin + up)
 
 

@@ -51,8 +51,7 @@ def ecology_of(species: Species) -> Ecology:
     # Stems of a stool are longer than it; leaves stand up beyond stems that are next to nothing.
     stool = len(lengths) > 1 and lengths[1] > lengths[0]
     leaf = max((order.leaf_size.mean for order in species.orders if order.leaves.high > 0), default=0.0)
-    tall = float(lengths[0] + (lengths[1] if stool else 0.0))
-    height = 1.33 * max(tall, leaf)
+    height = 1.33 * max(float(lengths[0] + (lengths[1] if stool else 0.0)), leaf)
     if height < 3.0:
         # Herbs and low shrubs: the crown is as wide as two thirds of the height, whatever the diameter is.
         thick = 0.01 * height

@@ -125,8 +125,7 @@ def part_segments(order: Order) -> np.ndarray:
 
 def _fold(cuts: list[float], fold: np.ndarray, start: Range) -> float:
     """How many times as many things a branch bears because it divides; they are spread evenly from ``start`` on."""
-    ends = np.clip((np.array(cuts) - start.mean) / (1 - start.mean), 0, 1)
-    return float(fold @ np.diff(ends))
+    return float(fold @ np.diff(np.clip((np.array(cuts) - start.mean) / (1 - start.mean), 0, 1)))
 
 
 def expected_polygons(species: Species) -> float:
@@ -152,8 +151,7 @@ def _dead_on(dead: Dead, order: Order, i: int, cuts: list[float], fold: np.ndarr
     """Expected dead branches (2,) by their order on one trunk, or on one limb."""
     low, high = dead.part(order.branch_start.mean)
     wanted = (dead.on_limbs if i else dead.number).mean
-    at = low + (high - low) * EVEN
-    stems = fold[np.searchsorted(cuts[1:-1], at, side="right")]
+    stems = fold[np.searchsorted(cuts[1:-1], low + (high - low) * EVEN, side="right")]
     full = 1 - dead.orders[0].count_by_length * (1 - dead_vigor(EVEN))
     return wanted * np.array([stems.mean(), dead.orders[0].branches.mean * (full * stems).mean()])
 

@@ -149,8 +149,7 @@ def _shaped(species: Species, shapes: list[tuple[float, float]]) -> Species:
 
 def _left(number: float, detail: float, pace: float = 1.0) -> float:
     """Factor on the number of a kind that has ``number`` members."""
-    base = max(number / _FEW, 1.0)
-    return base ** (detail - 1 if detail < 1 else pace * (detail - 1))
+    return max(number / _FEW, 1.0) ** (detail - 1 if detail < 1 else pace * (detail - 1))
 
 
 def _thinned(species: Species, members: Members, detail: float) -> Species:

@@ -180,8 +180,7 @@ def joined_edges(chains: Chains) -> tuple[Floats, Integers, Integers]:
         Chain of each edge.
     """
     points, edges = chains.points.copy(), chains.edges()
-    owner = np.repeat(np.arange(len(chains.cyclic)), np.diff(chains.first))
-    line = owner[edges[:, 0]]
+    line = np.repeat(np.arange(len(chains.cyclic)), np.diff(chains.first))[edges[:, 0]]
     if not len(edges):
         return points, edges, line
     near = _JOINED_WITHIN * float(np.ptp(points[:, :3], axis=0).max())
@@ -464,8 +463,7 @@ def drawn_branches(skeleton: Skeleton) -> DrawnBranches:
     bears = np.bincount(parent[~rooted], minlength=n) > 0
     heads = np.flatnonzero(~leads & (bears | ~rooted))
     generation = summed_from_root(parent, ~leads & ~rooted)
-    large = np.where(rooted[heads], -far[heads], 0)
-    heads = heads[np.lexsort((heads, large, generation[heads]))]
+    heads = heads[np.lexsort((heads, np.where(rooted[heads], -far[heads], 0), generation[heads]))]
     number = np.full(n, -1)
     number[heads] = np.arange(len(heads))
     branch = number[top(np.where(leads, parent, index))]
@@ -510,11 +508,9 @@ def _roots(points: Floats, pairs: Integers, size: float) -> Integers:
 
 def _pipe_radii(points: Floats, parent: Integers) -> Floats:
     """Radii (p,) by the pipe rule, see `skeleton_from_edges`."""
-    before = np.where(parent < 0, np.arange(len(parent)), parent)
-    step = np.linalg.norm(points - points[before], axis=1)
+    step = np.linalg.norm(points - points[np.where(parent < 0, np.arange(len(parent)), parent)], axis=1)
     longest = float(longest_way(parent, step).max())
-    tips = np.bincount(parent[parent >= 0], minlength=len(points)) == 0
-    wood = np.where(tips, _TIP * longest, 0.0)
+    wood = np.where(np.bincount(parent[parent >= 0], minlength=len(points)) == 0, _TIP * longest, 0.0)
     for now in levels(parent):
         np.add.at(wood, parent[now], wood[now] + step[now])
     return _ROOT_RADIUS * longest * np.sqrt(wood / wood.max())
@@ -529,8 +525,7 @@ def _base_radius(knots: Floats, radius: Floats, base: Integers, count: Integers)
     run = np.linalg.norm(knots[base + 1] - knots[base], axis=1)
     rise = np.linalg.norm(knots[beyond] - knots[base + 1], axis=1)
     steeper = np.maximum(here - radius[beyond], 0.0) * run / np.where(rise > 0, rise, np.inf)
-    start = np.where(here + steeper > 0, here + steeper, 0.5 * fork)
-    return np.minimum(start, np.maximum(fork, here))
+    return np.minimum(np.where(here + steeper > 0, here + steeper, 0.5 * fork), np.maximum(fork, here))
 
 
 def _arc(knots: Floats, first: Integers) -> Floats:

@@ -82,8 +82,7 @@ class NodeLaw(NamedTuple):
     begin: ArrayLike
     end: ArrayLike
     power: ArrayLike  # (...): the number of nodes below grows as this power of the length
-    #: whole and below, (...): number of nodes from ``begin`` to ``end`` (and on, as densely), and from the foot to
-    #: ``begin``.
+    #: whole and below, (...): nodes from ``begin`` to ``end`` (and on, as densely), and from the foot to ``begin``.
     whole: ArrayLike
     below: ArrayLike
 
@@ -278,8 +277,7 @@ def _days_north(day: float) -> float:
     half = _MIDSUMMER - _MIDWINTER
     spring = day < half
     place = day / half if spring else (day - half) / (DAYS - half)
-    near = min(1.0, 4.0 * min(place, 1.0 - place))
-    return near * (_SPRING_DAYS if spring else -_AUTUMN_DAYS)
+    return min(1.0, 4.0 * min(place, 1.0 - place)) * (_SPRING_DAYS if spring else -_AUTUMN_DAYS)
 
 
 @dataclass(frozen=True)
@@ -526,8 +524,7 @@ def whole_cuts(order: Order) -> list[float]:
     cuts = [0.0, *(order.fork_at + (1 - order.fork_at) * k / levels for k in range(levels)), 1.0]
     if order.growing is None:
         return cuts
-    reached = max(sum(cut < order.growing.now - _FORKS_FROM for cut in cuts[:-1]), 1)
-    return cuts[: reached + 1]
+    return cuts[: max(sum(cut < order.growing.now - _FORKS_FROM for cut in cuts[:-1]), 1) + 1]
 
 
 def crown_ratio(shape: Integers, r: Floats) -> Floats:

@@ -194,8 +194,7 @@ def keys_of(seed: int, what: int) -> Keys:
     return child_key(key_of_seed(seed), 2**33 + what)
 
 
-#: Height for the basal diameter over that in a closed stand: where the light beside the crown is full, and where there
-#: is none.
+#: Height for the basal diameter over that in a closed stand: where light beside the crown is full, and where is none.
 _SLENDER_LIT, _SLENDER_DARK = 0.72, 1.14
 #: Light beside a crown in which it begins to widen, for shade tolerance 0 and 5 (crowns of tolerant trees reach into
 #: each other); how much more lets it widen as fast as it can.
@@ -324,8 +323,7 @@ def dying(one: Plants, traits: StandTraits, year: int) -> Mask:
 
 def fallen(plants: Plants, last: Records, slope: tuple[NDArray, NDArray], cells: NDArray, year: float) -> DeadPlants:
     """What is left of plants that die in a year: trees that stand dead, and will fall, rather down the slope."""
-    large = (last.diameter >= _KEPT_DIAMETER) & (last.height >= _KEPT_HEIGHT)
-    kept = np.flatnonzero(large)
+    kept = np.flatnonzero((last.diameter >= _KEPT_DIAMETER) & (last.height >= _KEPT_HEIGHT))
     plants, last, cells = plants.take(kept), last.take(kept), cells[kept]
     lasts = np.sqrt(last.diameter.astype(np.float64) / _DEAD_DIAMETER)
     stands = np.floor((_STANDS[0] + (_STANDS[1] - _STANDS[0]) * uniform(plants.key, StandDraw.FALL) ** 2) * lasts) + 1.0
@@ -343,12 +341,10 @@ def fallen(plants: Plants, last: Records, slope: tuple[NDArray, NDArray], cells:
 #: Most plants at once.
 MOST_PLANTS = 12_000_000
 _PLANTED, _SOWN = 0, 1
-#: Planted plants have this part of the basal diameter of one that is 1.3 m high, those from seeds that; and are so many
-#: years.
+#: Of planted plants and those from seeds: part of the basal diameter of one that is 1.3 m high; and age, years.
 _PLANTED_DIAMETER, _SOWN_DIAMETER = 0.35, 0.25
 _PLANTED_AGE, _SOWN_AGE = 3.0, 3.0
-#: Meters of the grid on which seeds are spread, at least; and seeds on a square meter that make half as many plants as
-#: can come at all.
+#: Meters of the grid on which seeds are spread, at least; and seeds per m² that make half as many plants as can come.
 _SEED_CELL, _HALF = 4.0, 20.0
 #: Part of the ground beyond that is below crowns of each species that bear seeds.
 _OUTSIDE = 0.1
@@ -456,8 +452,7 @@ class SeedDispersal:
         seeds = self.fallen(plants)[:, row * self.columns + column]
         # Light that seedlings need, and that in which they do well, falls with the tolerance of shade.
         least = (0.9 * self.traits.light_compensation)[:, None]
-        lit = np.clip((ground[None, :] - least) / (3.0 * least), 0.0, 1.0)
-        able = seeds * lit * self.suitability[:, here]
+        able = seeds * np.clip((ground[None, :] - least) / (3.0 * least), 0.0, 1.0) * self.suitability[:, here]
         total = able.sum(axis=0)
         chance = total / (total + _HALF)
         if site.plantable is not None:

@@ -135,8 +135,7 @@ def layer_of(height: Floats) -> tuple[Integers, Floats]:
     a, b = _LAYERS
     height = np.maximum(height, 0.0)
     layer = ((np.sqrt(a * a + 4.0 * b * height) - a) / (2.0 * b)).astype(np.int64)
-    part = (height - layer_edge(layer)) / (a + b * (2 * layer + 1))
-    return layer, np.clip(part, 0.0, 1.0)
+    return layer, np.clip((height - layer_edge(layer)) / (a + b * (2 * layer + 1)), 0.0, 1.0)
 
 
 @dataclass
@@ -193,8 +192,7 @@ class LightGrid:
             raise TetFloraError(
                 "The ground is too large for columns this narrow; raise Cell, or choose a smaller ground"
             )
-        row = np.clip(((crowns.y + self.margin) / self.cell).astype(np.int64), 0, self.rows - 1)
-        strip = row // self.strip
+        strip = np.clip(((crowns.y + self.margin) / self.cell).astype(np.int64), 0, self.rows - 1) // self.strip
         order = np.argsort(strip, kind="stable")
         ends = np.searchsorted(strip[order], np.arange(len(self.strips) + 1))
         of_strip = [order[ends[i] : ends[i + 1]] for i in range(len(self.strips))]
@@ -221,8 +219,7 @@ class LightGrid:
         length = np.take(height - base, found.crown)
         # A cone loses its height with the distance from the middle, a dome half of it with the square of that.
         cone = np.take(top, found.crown)
-        lost = cone * np.sqrt(found.far) + (1.0 - cone) * 0.6 * found.far
-        length *= 1.0 - np.minimum(lost, 1.0 - _THIN)
+        length *= 1.0 - np.minimum(cone * np.sqrt(found.far) + (1.0 - cone) * 0.6 * found.far, 1.0 - _THIN)
         leaves = np.take(crowns.leaves[index] / (size**2 * _UNIT), found.crown) * found.part
         density = np.rint(leaves / np.maximum(length, 1e-3))
         column, area = found.column % self.columns, (high - low) * self.columns
@@ -336,8 +333,7 @@ def _through(
     y = own * np.float32(0.25 * _UNIT * thick)
     r = np.float32(1.0) + y * (np.float32(0.5) + y * np.float32(1.0 / 6.0))
     q = y * r
-    power = np.square(np.square(np.float32(1.0) + q))
-    mixed /= power
+    mixed /= np.square(np.square(np.float32(1.0) + q))
     after[block] = mixed
     q *= np.float32(1.5) + q * (np.float32(1.0) + np.float32(0.25) * q)
     q += np.float32(1.0)

@@ -44,8 +44,7 @@ class StandSite:
     plantable: NDArray | None = None
     moisture: NDArray | None = None  # (h, w): 0 dry to 1 wet; 0.5, fresh, where it is None
     fertility: NDArray | None = None  # (h, w): 0 poor to 1 rich; 0.7 where it is None
-    #: Sum of daily mean temperatures over 5 °C in a year (growing degree days), at the height 0; it is colder above by
-    #: 0.6 K for 100 m.
+    #: Sum of daily mean temperatures over 5 °C in a year (growing degree days), at height 0; 0.6 K colder each 100 m.
     degree_days: float = 1700.0
     coldest_month: float = -1.0  # mean temperature of the coldest month there, °C
 
@@ -91,8 +90,7 @@ class StandSite:
         """Index (n,) of the cell, row by row, at places (n,) in meters from the corner; the nearest of those beyond."""
         rows, columns = self.height.shape
         column = np.clip((np.asarray(x) / self.cell).astype(np.intp), 0, columns - 1)
-        row = np.clip((np.asarray(y) / self.cell).astype(np.intp), 0, rows - 1)
-        return row * columns + column
+        return np.clip((np.asarray(y) / self.cell).astype(np.intp), 0, rows - 1) * columns + column
 
     def ground(self, x: NDArray, y: NDArray) -> Floats:
         """Altitude (n,) at places (n,) in meters from the corner, bilinear between the middles of cells."""

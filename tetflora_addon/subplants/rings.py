@@ -77,8 +77,7 @@ def fine_sides(sides: Integers, pixels: Floats) -> Integers:
     """Sides (n,) of branches of a radius in pixels (n,) whose species has so many (n,): twice that, four times, ..."""
     enough = np.pi / np.arccos(np.clip(1.0 - DEVIATION / np.maximum(pixels, DEVIATION), -1.0, 1.0 - 1e-9))
     power = np.ceil(np.log2(np.maximum(enough / sides, 1.0)) - 1e-9)
-    most = np.floor(np.log2(np.maximum(MOST_SIDES / sides, 1.0)))
-    return sides << np.minimum(power, most).astype(np.int64)
+    return sides << np.minimum(power, np.floor(np.log2(np.maximum(MOST_SIDES / sides, 1.0)))).astype(np.int64)
 
 
 def fineness(flora: Flora, whole: WholeBranches, pixels: Pixels) -> Fineness:
@@ -216,8 +215,7 @@ def rings_of(flora: Flora, whole: WholeBranches) -> Rings:
     if whole.lines.later is not None:
         moved = WholeBranches(branches, whole.lines.later).knots(rows)[2]
         later = moved, radius * _ring_axes(whole.lines.later, owner, t)
-    reach = radius * _ring_axes(whole.lines, owner, t)
-    return Rings(branches, owner, t, center, reach, _goes_on(owner), later)
+    return Rings(branches, owner, t, center, radius * _ring_axes(whole.lines, owner, t), _goes_on(owner), later)
 
 
 def fine_numbers(flora: Flora, whole: WholeBranches, counts: Integers) -> tuple[Integers, Integers]:
@@ -290,8 +288,7 @@ def fine_rings(flora: Flora, whole: WholeBranches, fine: Fineness, counts: Integ
     light[above] *= narrow.astype(np.float32)
 
     def placed(lines: Axes) -> tuple[NDArray, NDArray]:
-        bent = _curve(flora, replace(whole, lines=lines), fine.weight)
-        center, across = bent.at(owner, segment, x, allowed)
+        center, across = _curve(flora, replace(whole, lines=lines), fine.weight).at(owner, segment, x, allowed)
         center += down
         tip = lines.frames[last, segments[last] - 1, :, 2]
         center[above] += high[:, None] * tip

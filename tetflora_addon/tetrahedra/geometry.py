@@ -167,8 +167,7 @@ def plane_through(points: Floats, negative: Floats) -> Floats:
     normal = normal / np.where(length > 0.0, length, 1.0)
     normal = np.where(np.sum(normal * (negative - a), axis=-1, keepdims=True) > 0.0, -normal, normal)
     # The mean of the three points carries less rounding error into the offset than any one of them.
-    offset = -np.sum(normal * (a + b + c), axis=-1, keepdims=True) / 3.0
-    return np.concatenate([normal, offset], axis=-1)
+    return np.concatenate([normal, -np.sum(normal * (a + b + c), axis=-1, keepdims=True) / 3.0], axis=-1)
 
 
 def plane_distance(planes: Floats, points: Floats) -> Floats:

@@ -155,8 +155,7 @@ def divide_in_eight(vertices: Floats, diagonal: Integers | None = None) -> tuple
         Positively oriented; child ``4 s + 2 t + u`` on sides ``s``, ``t``, ``u`` of three planes; the even are corners.
     """
     diagonal = best_diagonal(vertices) if diagonal is None else diagonal
-    middles = (vertices[:, EDGES[:, 0]] + vertices[:, EDGES[:, 1]]) / 2.0
-    points = np.concatenate([vertices, middles], axis=1)
+    points = np.concatenate([vertices, (vertices[:, EDGES[:, 0]] + vertices[:, EDGES[:, 1]]) / 2.0], axis=1)
     every = np.arange(len(vertices))[:, None, None]
     through = points[every, _PLANES[diagonal]]
     return plane_through(through[..., :3, :], through[..., 3, :]), points[every, _CHILDREN[diagonal]]

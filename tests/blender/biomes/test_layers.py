@@ -161,7 +161,7 @@ def test_update_grows_what_is_due_and_nothing_else():
     first, _ = _scatter("A", 5), _scatter("B", 6)
     first = _group().layers[0]
     kept = set(populations.own_objects(bpy.context.scene, _group().layers[1]))
-    with pytest.raises(RuntimeError, match=r"No setting has changed.*Update This Layer"):
+    with pytest.raises(RuntimeError, match=r"No setting and no ground has changed.*Update This Layer"):
         _ops().update_layers()
     first.count = 8
     assert layers.due_layers(bpy.context.scene) == [first.uid]

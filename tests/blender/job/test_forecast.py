@@ -15,6 +15,7 @@ from tests.blender.scenes import add_camera, add_mesh, add_plant, depsgraph, sel
 from tetflora_addon import memory
 from tetflora_addon.blender.job import contents, forecast, refine
 from tetflora_addon.blender.scene.camera import read_camera
+from tetflora_addon.jobs import run_to_end
 from tetflora_addon.processes import pool
 
 pytestmark = pytest.mark.usefixtures("clean_file")
@@ -76,7 +77,31 @@ def test_while_crowns_are_looked_for_a_text_says_so(monkeypatch):
     add_camera()
     add_plant(species="birch")
     monkeypatch.setattr(forecast, "crown_to_draw", lambda *_, **__: None)
-    assert forecast._text_for(bpy.context.scene, bpy.context.view_layer) == "Estimating…"
+    assert run_to_end(forecast._text_for(bpy.context.scene, bpy.context.view_layer)) == "Estimating…"
+
+
+@pytest.mark.parametrize("hidden", [False, True])
+def test_many_plants_are_counted_one_by_one_between_redraws(hidden):
+    """At once, 100,000 of them stopped the window for a fifth of a second."""
+    add_camera()
+    away = bpy.data.collections.new("away")
+    bpy.context.scene.collection.children.link(away)
+    away.hide_render = hidden
+    for number in range(150):
+        add_plant(f"plant {number}", location=(0.0, float(number), 0.0))
+        add_plant(f"other {number}", location=(1.0, float(number), 0.0), collection=away)
+    expected = _forecast()
+    assert expected.plants == (150 if hidden else 300)
+    forecast._on_change()
+    shown, steps = (bpy.context.scene, bpy.context.view_layer), 0
+    found = forecast.forecast_steps(*shown)
+    try:
+        while True:
+            next(found)
+            steps += 1
+    except StopIteration as stop:
+        assert stop.value.plants == expected.plants
+    assert steps >= expected.plants
 
 
 @pytest.mark.parametrize("as_field", ["EMPTIES", "FIELD"])

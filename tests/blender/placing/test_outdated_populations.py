@@ -5,10 +5,14 @@
 from __future__ import annotations
 
 import bpy
+import numpy as np
 import pytest
+from mathutils import Matrix
 
-from tests.blender.scenes import add_mesh, select
+from tests.blender.scenes import add_mesh, depsgraph, select
+from tetflora_addon.blender.biomes import layers
 from tetflora_addon.blender.placing import populations, rules
+from tetflora_addon.blender.placing.terrain import ground_form, lies_elsewhere
 from tetflora_addon.blender.viewport import points
 
 pytestmark = pytest.mark.usefixtures("clean_file")
@@ -149,3 +153,196 @@ def test_a_layer_whose_plants_were_all_deleted_is_due(store):
     assert rules.awaits_update(population)
     assert bpy.ops.tetflora.update_layers() == {'FINISHED'}
     assert len(own) and populations.own_number(populations.own_objects(bpy.context.scene, population)) == 20
+
+
+def _set(name, **values):
+    for key, value in values.items():
+        setattr(bpy.data.objects[name], key, value)
+
+
+def _shift(*vertices):
+    mesh = bpy.data.objects["ground"].data
+    for vertex in vertices:
+        mesh.vertices[vertex].co.z += 1.0
+    mesh.update()
+
+
+def _apply_scale():
+    ground = bpy.data.objects["ground"]
+    ground.data.transform(Matrix.Diagonal((*ground.scale, 1.0)))
+    ground.scale = (1.0, 1.0, 1.0)
+
+
+def _swap_faces():
+    mesh = bpy.data.objects["ground"].data
+    points = [vertex.co[:] for vertex in mesh.vertices]
+    mesh.clear_geometry()
+    mesh.from_pydata(points, [], [(0, 1, 2)])
+
+
+#: Changes of a ground, what takes each back if anything does, and whether plants would then stand elsewhere.
+GROUNDS = {
+    "moved": (lambda: _set("ground", location=(0.0, 0.0, 0.01)), lambda: _set("ground", location=(0, 0, 0)), True),
+    "carried": (lambda: _set("carrier", location=(5.0, 0.0, 0.0)), lambda: _set("carrier", location=(0, 0, 0)), True),
+    "turned": (
+        lambda: _set("ground", rotation_euler=(0, 0, 0.1)),
+        lambda: _set("ground", rotation_euler=(0, 0, 0)),
+        True,
+    ),
+    "scaled": (lambda: _set("ground", scale=(1.0, 1.1, 1.0)), lambda: _set("ground", scale=(1.0, 1.0, 1.0)), True),
+    "edited": (lambda: _shift(2), None, True),
+    "without a face": (_swap_faces, None, True),
+    "with a modifier": (lambda: bpy.data.objects["ground"].modifiers.new("more", 'SUBSURF'), None, True),
+    "scale applied": (_apply_scale, None, False),
+    "selected": (lambda: select(bpy.data.objects["ground"]), None, False),
+    "painted": (lambda: bpy.data.objects["ground"].data.materials.append(bpy.data.materials.new("soil")), None, False),
+    "another mesh moved": (lambda: _set("rock", location=(0.0, 0.0, 1.0)), None, False),
+}
+
+
+def _on_ground(kind):
+    """A layer of a kind on a ground that hangs on another object."""
+    ground = add_mesh("ground", size=20.0)
+    add_mesh("rock")
+    ground.parent = carrier = bpy.data.objects.new("carrier", None)
+    bpy.context.scene.collection.objects.link(carrier)
+    select(ground)
+    scene = bpy.context.scene
+    scene.tetflora.stand.years, scene.tetflora.stand.density = 2, 2000.0
+    grown = bpy.ops.tetflora.grow_stand if kind == 'STAND' else bpy.ops.tetflora.populate
+    assert grown(**({} if kind == 'STAND' else {"count": 5, "species": "bush"})) == {'FINISHED'}
+    bpy.context.view_layer.update()
+    return scene
+
+
+def _due(scene):
+    bpy.context.view_layer.update()
+    found = layers.due_layers(scene)
+    assert [layer.uid for layer in scene.tetflora.layers if layers.is_due(layer)] == found
+    return len(found)
+
+
+@pytest.mark.parametrize("kind", ['SCATTER', 'STAND'])
+@pytest.mark.parametrize("change", GROUNDS)
+def test_a_ground_that_is_another_makes_its_layers_due(change, kind):
+    """They stood in the air where it had been, and Update said that nothing was to do."""
+    make, take_back, counts = GROUNDS[change]
+    scene = _on_ground(kind)
+    if change == "scale applied":
+        _set("ground", scale=(1.5, 1.0, 0.7))
+        bpy.ops.tetflora.update_layers()
+    assert _due(scene) == 0
+    make()
+    assert _due(scene) == counts
+    if take_back:
+        take_back()
+        assert _due(scene) == 0
+        make()
+    if counts:
+        assert bpy.ops.tetflora.update_layers() == {'FINISHED'}
+    assert _due(scene) == 0
+
+
+def test_plants_follow_a_ground_that_was_lifted():
+    scene = _on_ground('SCATTER')
+    _set("ground", location=(0.0, 0.0, 7.0))
+    bpy.context.view_layer.update()
+    bpy.ops.tetflora.update_layers()
+    bpy.context.view_layer.update()
+    own = populations.own_objects(scene, scene.tetflora.layers[0])
+    assert [plant.matrix_world.translation.z for plant in own] == pytest.approx([7.0] * 5)
+
+
+def test_undo_of_a_move_takes_the_mark_away():
+    scene = _on_ground('SCATTER')
+    bpy.ops.ed.undo_push(message="planted")
+    _set("ground", location=(0.0, 0.0, 2.0))
+    bpy.ops.ed.undo_push(message="moved")
+    assert _due(scene) == 1
+    bpy.ops.ed.undo()
+    assert _due(bpy.context.scene) == 0
+    bpy.ops.ed.redo()
+    assert _due(bpy.context.scene) == 1
+
+
+def test_grounds_of_a_collection_count_and_so_does_one_more():
+    ground, home = add_mesh("ground", size=10.0), bpy.data.collections.new("grounds")
+    home.objects.link(ground)
+    select(ground)
+    bpy.ops.tetflora.populate(count=5, species="bush")
+    scene, population = bpy.context.scene, _population()
+    populations.set_grounds(population, [])
+    population.ground_collection = home
+    bpy.ops.tetflora.update_layers()
+    assert _due(scene) == 0
+    home.objects.link(add_mesh("one more"))
+    assert _due(scene) == 1
+    bpy.ops.tetflora.update_layers()
+    ground.location.x = 1.0
+    assert _due(scene) == 1
+
+
+def test_neither_frozen_layers_nor_those_without_a_ground_nor_those_of_older_files_become_due():
+    scene = _on_ground('SCATTER')
+    population = _population()
+    known = population.stood_on
+    _set("ground", location=(0.0, 0.0, 2.0))
+    assert _due(scene) == 1
+    for text in ("", "no numbers", "1 2 3"):  # of a file from before this was noted, and of one that is broken
+        population.stood_on = text
+        assert _due(scene) == 0
+    population.stood_on, population.frozen = known, True
+    assert _due(scene) == 0
+    population.frozen = False
+    ground = bpy.data.objects["ground"]
+    ground.hide_set(True)
+    assert _due(scene) == 0
+    ground.hide_set(False)
+    assert _due(scene) == 1
+    scene.collection.objects.unlink(ground)
+    assert _due(scene) == 0
+
+
+def test_grounds_are_looked_up_and_nothing_lists_all_objects_for_them(monkeypatch):
+    """With 100,000 objects each of ten layers took 60 ms."""
+    scene = _on_ground('SCATTER')
+    monkeypatch.setattr(bpy.types.Object, "users_scene", property(lambda _: pytest.fail("listed all objects")))
+    assert rules.grounds_of(scene, _population()) == [bpy.data.objects["ground"]]
+    scene.collection.objects.unlink(bpy.data.objects["ground"])
+    assert rules.grounds_of(scene, _population()) == []
+
+
+def test_where_it_stands_goes_neither_into_copies_nor_into_files():
+    scene = _on_ground('SCATTER')
+    assert "stood_on" not in {prop.identifier for prop in rules.settings_of(_population())}
+    bpy.ops.tetflora.duplicate_layer()
+    assert scene.tetflora.layers[1].stood_on == ""
+
+
+def test_a_ground_is_not_looked_at_while_panels_are_drawn(monkeypatch):
+    """In a window; what was found last counts."""
+    _on_ground('SCATTER')
+    monkeypatch.setattr(rules, "ground_form", lambda *_: pytest.fail("looked at a ground"))
+    monkeypatch.setattr(rules.changed_grounds, "of", lambda *_: {_population().uid})
+    assert layers.is_due(_population())
+    monkeypatch.setattr(rules.changed_grounds, "of", lambda *_: None)
+    assert not layers.is_due(_population())
+
+
+def test_what_single_precision_moves_counts_for_nothing():
+    """A mesh far from the middle of the world whose scale is applied lies where it lay, but for single precision."""
+    side = 200
+    mesh = bpy.data.meshes.new("land")
+    x, y = np.meshgrid(np.linspace(-500, 500, side), np.linspace(-500, 500, side))
+    mesh.from_pydata(np.stack([x, y, np.sin(x)], axis=-1).reshape(-1, 3).tolist(), [], [])
+    land = bpy.data.objects.new("land", mesh)
+    bpy.context.scene.collection.objects.link(land)
+    land.scale, land.location = (1.7, 1.3, 0.9), (3000.0, -2000.0, 40.0)
+    before = ground_form(land, depsgraph())
+    mesh.transform(Matrix.Diagonal((*land.scale, 1.0)))
+    land.scale = (1.0, 1.0, 1.0)
+    assert not lies_elsewhere(before, ground_form(land, depsgraph()))
+    for number in range(50):  # a dent of 20 cm
+        mesh.vertices[10_000 + number].co.z -= 0.2
+    mesh.update()
+    assert lies_elsewhere(before, ground_form(land, depsgraph()))

@@ -23,6 +23,7 @@ from tetflora_addon.blender.compat import shader_tree
 from tetflora_addon.blender.job import forecast
 from tetflora_addon.blender.placing import populations
 from tetflora_addon.blender.viewport import auto, warnings
+from tetflora_addon.blender.worker import calling
 from tetflora_addon.emission.budget import Estimate
 
 pytestmark = pytest.mark.usefixtures("clean_file")
@@ -55,7 +56,7 @@ def test_darkness_is_seen_and_daylight_ends_it():
 def test_a_world_lights_by_its_color(color, dark):
     world = bpy.context.scene.world = bpy.data.worlds.new("own")
     shader_tree(world).nodes["Background"].inputs["Color"].default_value = (*color, 1.0)
-    assert warnings.is_dark(bpy.context.scene) == dark
+    assert warnings.is_dark(bpy.context.scene, []) == dark
 
 
 def test_daylight_never_touches_what_is_the_artists():
@@ -122,6 +123,29 @@ def test_the_camera_steps_out_of_a_crown_and_its_range_reaches_all_plants():
     assert far.location.y == 300.0
 
 
+def test_a_camera_below_the_ground_is_told_and_lifted():
+    """After the ground was lifted it saw nothing but that from below, and was said to be in a dark wood."""
+    ground = add_mesh("ground", size=50.0)
+    select(ground)
+    bpy.ops.tetflora.populate(count=3, min_distance=0.0, species="bush")
+    camera = add_camera(location=(0.0, 0.0, 1.7))
+    assert "below" not in _keys()
+    ground.location.z, ground.scale.z = 6.0, 0.5
+    assert "below" in _keys()
+    assert "shade" not in _keys()
+    _mend("below")
+    assert tuple(camera.matrix_world.translation) == pytest.approx((0.0, 0.0, 7.7))
+    camera.location.z = 3.0
+    assert "below" in _keys()
+    floor = add_mesh("floor", size=50.0)  # in a cave
+    populations.set_grounds(bpy.context.scene.tetflora.layers[0], [ground, floor])
+    assert "below" not in _keys()
+    ground.hide_set(True)
+    camera.location.z = -3.0
+    floor.hide_set(True)
+    assert "below" not in _keys()
+
+
 def test_crowns_of_a_field_count_and_are_asked_for_by_species(monkeypatch):
     """Not by plant: ground cover has thousands around the camera, and looking took seconds after each change."""
     select(add_mesh("ground", size=16.0))
@@ -136,6 +160,25 @@ def test_crowns_of_a_field_count_and_are_asked_for_by_species(monkeypatch):
     assert sorted(asked) == ["bush", "fern"]
     bpy.context.scene.camera.location.z = 10.0
     assert "crown" not in _keys()
+
+
+def test_many_plants_are_looked_at_one_by_one_between_redraws():
+    """At once, 100,000 of them stopped the window for a second."""
+    for number in range(200):
+        add_plant(f"plant {number}", location=(0.0, float(number), 0.0))
+    add_camera(location=(0.0, -20.0, 1.7)).data.clip_end = 100.0
+    bpy.context.view_layer.update()
+    steps = warnings._steps(bpy.context.scene, bpy.context.view_layer)
+    found, number = [], 0
+    try:
+        while True:
+            next(steps)
+            number += 1
+    except StopIteration as stop:
+        found = stop.value
+    assert number >= 200
+    assert [one.key for one in found] == _keys()
+    assert {"clip", "light"} <= set(_keys())
 
 
 def test_a_slow_first_look_does_not_delay_the_next(monkeypatch):
@@ -193,11 +236,11 @@ def test_nothing_that_the_panel_says_is_cut_in_a_sidebar_of_usual_width(monkeypa
     given = [call.args for call in calls if getattr(call.func, "id", "") == "Warned"]
     assert len(given) > 10
     for _, short, _, *button in given:
-        assert blf.dimensions(0, f"{short.value} (+2)")[0] <= 110.0, short.value
+        assert blf.dimensions(0, f"{short.value} (+2)")[0] <= 97.0, short.value
         assert all(blf.dimensions(0, one.value)[0] <= 58.0 for one in button[:1]), button[0].value
     scene, layer = bpy.context.scene, bpy.context.view_layer
     found = Estimate(1, 870_000.0, 1500.0, 13.2 * memory.GIGABYTE, "")
-    monkeypatch.setattr(forecast, "forecast", lambda *_: found)
+    monkeypatch.setattr(forecast, "forecast_steps", lambda *_: calling(lambda: found))
     add_camera()
     said = [forecast.forecast_text(scene, layer), "Not refined: renders show no plants"]
     for names in (["the day or year", "settings"], ["the day or year"], ["settings"]):

@@ -219,8 +219,7 @@ def _sampled(meshes: list[_Mesh]) -> tuple[Floats, Floats, Floats]:
     if not out:
         return np.zeros((0, 3)), np.zeros((0, 3)), np.zeros((0, 3))
     position, normal, color = (np.concatenate(column) for column in zip(*out, strict=True))
-    length = np.sqrt(np.einsum("ni,ni->n", normal, normal))
-    return position, normal / np.maximum(length, 1e-12)[:, None], color
+    return position, normal / np.maximum(np.sqrt(np.einsum("ni,ni->n", normal, normal)), 1e-12)[:, None], color
 
 
 def _drawn(points: Floats, normals: Floats, colors: Floats, low: Floats, high: Floats) -> NDArray[np.uint8]:

@@ -149,7 +149,7 @@ def _settings_in(owner: bpy.types.bpy_struct, deepest: int = 4) -> list[tuple[st
     return [(n, _settings_in(v, deepest - 1) if n in inner else _plain(v)) for n, v in found.items()]
 
 
-def form_of(obj: bpy.types.Object, deepest: int = DEEPEST) -> str:
+def form_steps(obj: bpy.types.Object, deepest: int = DEEPEST) -> Generator[None, None, str]:
     """Digest of what an object shows, as it is stored, with modifiers and what its collection holds, unevaluated."""
     data = obj.data
     said: list[object] = [(m.type, _settings_in(m), stored_inputs(m)) for m in obj.modifiers]
@@ -158,12 +158,14 @@ def form_of(obj: bpy.types.Object, deepest: int = DEEPEST) -> str:
         splines = getattr(data, "splines", ())
         said += [_settings_in(data), [[p.co[:] for p in (*s.points, *s.bezier_points)] for s in splines]]
     content = hashlib.sha256(repr((obj.type, said)).encode())
-    for attribute in getattr(data, "attributes", ()):
-        if attribute.data_type in KINDS and (attribute.name == ".corner_vert" or not attribute.name.startswith(".")):
-            content.update(f"{attribute.name} {attribute.domain}".encode())
+    for name in [*getattr(data, "attributes", {}).keys()]:
+        attribute = data.attributes.get(name)  # with others, its own place changes
+        if attribute and attribute.data_type in KINDS and (name == ".corner_vert" or not name.startswith(".")):
+            content.update(f"{name} {attribute.domain}".encode())
             content.update(values_of(attribute))
+            yield
     for inner in objects_within(obj.instance_collection) if obj.instance_collection and deepest else ():
-        content.update(repr((inner.matrix_world[:], form_of(inner, deepest - 1))).encode())
+        content.update(repr((inner.matrix_world[:], (yield from form_steps(inner, deepest - 1)))).encode())
     return content.hexdigest()
 
 
@@ -356,8 +358,7 @@ def _add_mesh(content: "hashlib._Hash", mesh: bpy.types.Mesh, slots: Slots) -> N
         if kind in _TYPES and (attribute.name in wanted or kind == 'FLOAT2'):
             content.update(f"{attribute.name} {attribute.domain} {kind}".encode())
             content.update(values_of(attribute, "color" if kind in _COLORS else ""))
-    first = next((layer.name for layer in mesh.uv_layers if layer.active_render), "")
-    content.update(first.encode())
+    content.update(next((layer.name for layer in mesh.uv_layers if layer.active_render), "").encode())
 
 
 #: Triangles whose corners become vertices at once.

@@ -148,8 +148,7 @@ def checked(data: Any, identifier: str) -> Biome:
         raise ValueError('"layers" is empty')
     for number, layer in enumerate(layers, 1):
         _check_layer(f"layer {number}", layer)
-    own = {key: data[key] for key in ("name", "layers", *sorted(_MORE)) if key in data}
-    return Biome(identifier, **own)
+    return Biome(identifier, **{key: data[key] for key in ("name", "layers", *sorted(_MORE)) if key in data})
 
 
 def biome_data(

@@ -9,7 +9,9 @@ from collections.abc import Sequence
 
 import bpy
 
+from ...jobs import run_to_end
 from ..compat import stored_properties
+from ..placing import rules
 from ..placing.plant_objects import PAINTED_MARK, note_field, plant_collection
 from ..placing.populations import add_population
 from ..placing.rules import BIOME_ONLY, awaits_update, copy_settings, free_seed, grounds_of, set_grounds
@@ -71,13 +73,16 @@ def is_due(layer: Layer) -> bool:
         field = layer.field
         if field is None or not field.tetflora.stand.grown_by or not has_history(field):
             return False
-        return field.tetflora.stand.grown_by != stand_settings_now(layer.id_data, field)
+        return field.tetflora.stand.grown_by != stand_settings_now(layer.id_data, field) or rules.on_changed_ground(
+            layer
+        )
     return awaits_update(layer)
 
 
 def due_layers(scene: bpy.types.Scene) -> list[str]:
-    """Identities of all layers that an update would change, but biomes, whose layers are among them."""
-    return [layer.uid for layer in scene.tetflora.layers if layer.kind != BIOME and is_due(layer)]
+    """Identities of all layers that an update would change, but biomes, whose layers are among them; reads grounds."""
+    layers, moved = scene.tetflora.layers, run_to_end(rules.changed_steps(scene, bpy.context.view_layer))
+    return [one.uid for one in layers if one.kind != BIOME and (is_due(one) or (one.uid in moved and not one.frozen))]
 
 
 def is_gone(layer: Layer) -> bool:
@@ -176,8 +181,7 @@ def group_layer(scene: bpy.types.Scene) -> bool:
     if above and layers[index_of(scene, above[0])].kind == BIOME:
         _put_into(layer, above[0])
     else:
-        grounds = grounds_of(scene, rules_of(layer))
-        made = add_population(scene, grounds, name="Group")
+        made = add_population(scene, grounds_of(scene, rules_of(layer)), name="Group")
         made.kind, made.limits, made.gives_way, group = BIOME, set(), False, made.uid
         for one in (*above, uid):
             _put_into(layers[index_of(scene, one)], group)

@@ -359,8 +359,7 @@ def _square(
         corners = np.array([(0, 0), (1, 0), (1, 1), (0, 1)], np.float32)
         mesh.from_pydata(np.pad(meters * extent * corners, ((0, 0), (0, 1))).tolist(), [], [(0, 1, 2, 3)])
         for name, uv in (("UVMap", low + corners * extent), ("bake", corners)):
-            layer = mesh.uv_layers.new(name=name)
-            layer.uv.foreach_set("vector", np.ascontiguousarray(uv, np.float32).reshape(-1))
+            mesh.uv_layers.new(name=name).uv.foreach_set("vector", np.ascontiguousarray(uv, np.float32).reshape(-1))
         mesh.uv_layers.active = mesh.uv_layers["bake"]
         write(mesh, "tf_color", np.array([color], np.float32), 'FACE')
         write(mesh, "tf_transmission", np.array([through], np.float32), 'FACE')

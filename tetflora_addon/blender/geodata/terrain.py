@@ -162,8 +162,7 @@ def terrain_steps(order: Import, most: int, image: Path | None = None) -> Steps:
     coarse = yield from call_in_thread(Progress(0.7, "Making the ground"), raster.coarser, most)
     h, w = coarse.values.shape
     column, row = np.tile(np.arange(w), h), np.repeat(np.arange(h), w)
-    flat = order.local(place, coarse.places(column, row), coarse.system)
-    points = np.column_stack([flat, coarse.values.ravel()])
+    points = np.column_stack([order.local(place, coarse.places(column, row), coarse.system), coarse.values.ravel()])
     yield Progress(0.8, "Making the ground")
     faces = _faces(coarse)
     if not len(faces):
@@ -262,8 +261,7 @@ def heights_steps(order: Import, progress: Progress) -> Job[HeightGrid | None]:
     if not order.grounds:
         return None
     triangles = read_ground(order.grounds, order.depsgraph).triangles
-    cell = cell_for(triangles, _FINEST, _MOST_CELLS)
-    return (yield from call_in_thread(progress, height_grid, triangles, cell))
+    return (yield from call_in_thread(progress, height_grid, triangles, cell_for(triangles, _FINEST, _MOST_CELLS)))
 
 
 _STEP, _ABOVE = 4.0, 0.08  # meters between points of roads on the ground, and how far they lie above it

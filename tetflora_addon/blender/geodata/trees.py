@@ -146,8 +146,7 @@ def complete(
                 break
             by = getattr(curves, name)
             found = np.interp(np.log(known[some]), np.log(by), np.log(curves.height))
-            beyond = np.clip(known[some] / by[-1], 1.0, None) ** 0.5
-            height[some] = np.exp(found) * np.minimum(beyond, _TALLER)
+            height[some] = np.exp(found) * np.minimum(np.clip(known[some] / by[-1], 1.0, None) ** 0.5, _TALLER)
             if name == "diameter":  # it is measured at that height
                 height[some] = np.maximum(height[some], _BREAST + np.minimum(_SLENDER * known[some], 1.0))
     return height, int((height != sizes["height"]).sum())

@@ -6,6 +6,7 @@ Plants are counted, some of them looked at, and figures computed a moment after 
 often than a few hundredths of the time allow; never while a panel is drawn.
 """
 
+from collections.abc import Generator
 from contextlib import suppress
 from dataclasses import replace
 
@@ -19,6 +20,7 @@ from ...compiled.recorded_sizes import CROWDED, ages_of_heights, crowds
 from ...emission.budget import Estimate, Stand, estimate
 from ...errors import SpeciesError, TetFloraError
 from ...growth.seasons import PRESENT, expected_of
+from ...jobs import run_to_end
 from ...processes import pool
 from ...species.kinds import Kind, species_of
 from ..attributes import read, values_of
@@ -27,7 +29,7 @@ from ..scene.ages import crown_kinds
 from ..scene.camera import read_camera
 from ..scene.crowns import crown_to_draw
 from ..scene.fields import AGE, HEIGHT, PREFIX, field_kinds, sound_ages, stored_now
-from ..scene.objects import objects_within, renderable_objects
+from ..scene.objects import objects_within, renderable_in_parts
 from ..settings import most_memory, season_of
 from ..species.edits import display_height, species_for
 from .contents import check_settings, memory_left, picture_bytes, settings_from
@@ -46,12 +48,17 @@ def forecast(scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer) -> Estimat
 
     None without plants, where the camera cannot be used, and in a window for a moment, until crowns are known.
     """
+    return run_to_end(forecast_steps(scene, view_layer))
+
+
+def forecast_steps(scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer) -> Generator[None, None, Estimate | None]:
+    """The same in small steps, during which nothing may change."""
     global _layer, _stand
     depsgraph, layer = view_layer.depsgraph, (scene.session_uid, view_layer.name)
     if depsgraph is None or scene.camera is None:
         return None
     if _stand is None or _layer != layer:
-        _stand, _layer = _count(scene, view_layer), layer
+        _stand, _layer = (yield from _count(scene, view_layer)), layer
     if _stand is None or not len(_stand.number):
         return None
     try:
@@ -62,8 +69,7 @@ def forecast(scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer) -> Estimat
     used = (memory.resident() or 0) + picture_bytes(scene, camera)
     processes = pool.number(memory.limit(most_memory(scene)))
     allowed = memory_left(scene, camera)
-    everything = scene.tetflora.expand_everything
-    return estimate(_stand, camera, settings_from(scene), used, allowed, everything, processes)
+    return estimate(_stand, camera, settings_from(scene), used, allowed, scene.tetflora.expand_everything, processes)
 
 
 def learn(expected: Estimate | None, seconds: float) -> None:
@@ -86,8 +92,8 @@ def forecast_text(scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer) -> st
     return _outlook.of(scene, view_layer) or ""
 
 
-def _text_for(scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer) -> str:
-    found = forecast(scene, view_layer)
+def _text_for(scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer) -> Generator[None, None, str]:
+    found = yield from forecast_steps(scene, view_layer)
     if found is None:
         # Plants are there, and their crowns are being looked for.
         return "" if _stand is not None or scene.camera is None else "Estimating…"
@@ -119,10 +125,11 @@ def polygons_text(number: float) -> str:
     return f"{number / size:{'g' if number < 10.0 * size else ',.0f'}}{unit} polygons"
 
 
-def _count(scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer) -> Stand | None:
+def _count(scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer) -> Generator[None, None, Stand | None]:
     single: list[bpy.types.Object] = []
     parts: list[tuple[int, Floats, Floats, list[str]]] = []
-    for obj in renderable_objects(view_layer):
+    for obj in renderable_in_parts(view_layer):
+        yield
         group = obj.tetflora
         if group.is_plant:
             if group.enabled:

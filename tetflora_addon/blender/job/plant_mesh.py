@@ -111,8 +111,7 @@ def make_plant_mesh_steps(data: JobData, plants: Iterable[bpy.types.Object]) -> 
             progress = Progress(number / len(plants), f"mesh {number + 1:,} of {len(plants):,}")
             yield progress
             flora = floras[seed.identifiers[0]]
-            one = replace(seed, scale=np.ones(1))
-            parts = yield from call_in_thread(progress, plant_parts, flora, one)
+            parts = yield from call_in_thread(progress, plant_parts, flora, replace(seed, scale=np.ones(1)))
             data.check()  # it may have waited for the thread meanwhile
             mesh = plant_mesh(scene, f"{plant.name} mesh", flora.species[0], parts)
             data_made += [mesh, *mesh.materials]

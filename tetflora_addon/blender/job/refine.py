@@ -356,8 +356,7 @@ def refine_steps(
     data.add_objects(taking_part(scene))
     data.add_objects(leaf_objects(scene).values())
     results = Results(scene, 'RENDER' if for_render else 'VIEW', mark, data)
-    run = _Run(depsgraph, camera, given, data, results, beside)
-    return guarded(data, _refine_steps(run, first_look))
+    return guarded(data, _refine_steps(_Run(depsgraph, camera, given, data, results, beside), first_look))
 
 
 def _refine_steps(run: _Run, first_look: bool) -> Job[Statistics]:

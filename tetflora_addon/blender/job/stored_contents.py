@@ -3,67 +3,88 @@
 """Plants, meshes and lights of a scene as texts, which tell whether results are out of date.
 
 `frame_cache.scene_digest` knows exactly, but reads the scene as refining does: ten seconds for 100,000 plants. Here all
-is taken as it is stored, within a second, and only after Blender has told of a change. Who is seen is looked at always.
+is taken as stored, in small steps of a second in all, and only after Blender has told of a change. Who is seen is
+looked at always.
 """
 
+from collections.abc import Generator, Iterator
 from hashlib import blake2b
 
 import bpy
 import numpy as np
 
-from ..assets.places import form_of
-from ..attributes import members
+from ...jobs import run_to_end
+from ..assets.places import form_steps
 from ..materials.nodes import is_ours
 from ..results.hiding import artists_flags
 from ..results.leaf_objects import leaf_objects
 from ..runtime import handlers
 from ..scene.fields import field_kinds
 from ..scene.lights import sky_suns
-from ..scene.looks import shown_objects
-from ..scene.objects import may_take_part, objects_within
+from ..scene.objects import in_parts, may_take_part, objects_within
 from ..species.asset_species import asset_species
 
 # Who is there, and texts, by scene and layer.
-_found: dict[tuple[int, str], tuple[tuple[int, int], dict[str, str]]] = {}
+_found: dict[tuple[int, str], tuple[int, dict[str, str]]] = {}
 
 
 def stored_contents(scene: bpy.types.Scene, layer: bpy.types.ViewLayer) -> dict[str, str]:
     """Texts that differ where what takes part does, by what to call it; those found last where nothing has changed."""
-    key, who = (scene.session_uid, layer.name), (len(layer.objects), hash(tuple(shown_objects(layer))))
-    if _found.get(key, ((),))[0] != who:
-        _found[key] = who, _read(scene, layer)
+    return run_to_end(stored_contents_steps(scene, layer))
+
+
+def stored_contents_steps(scene: bpy.types.Scene, layer: bpy.types.ViewLayer) -> Generator[None, None, dict[str, str]]:
+    """The same in small steps; if Blender tells of a change between two of them, what is found is good for nothing."""
+    key, shown = (scene.session_uid, layer.name), {}
+    for obj in in_parts(layer.objects):
+        shown[obj.session_uid] = obj.visible_get(view_layer=layer)
+        yield
+    if _found.get(key, (None,))[0] != (who := hash((*shown, *shown.values()))):
+        _found[key] = who, (yield from _read(scene, layer, shown))
     return _found[key][1]
 
 
-def _read(scene: bpy.types.Scene, layer: bpy.types.ViewLayer) -> dict[str, str]:
-    shown, numbers, plants, kinds = set(shown_objects(layer)), [], [], set()
-    lights: list[object] = [sky_suns(scene)]
-    meshes: list[object] = [form_of(obj) for obj in leaf_objects(scene).values()]
-    for number, obj in enumerate(layer.objects):
+def _lineage(obj: bpy.types.Object | None) -> Iterator[bpy.types.Object]:
+    while obj is not None:
+        yield obj
+        obj = obj.parent
+
+
+def _read(
+    scene: bpy.types.Scene, layer: bpy.types.ViewLayer, shown: dict[int, bool]
+) -> Generator[None, None, dict[str, str]]:
+    kinds, sums = set(), dict.fromkeys(("the plants", "the meshes", "the light"), 0)
+
+    def add(part: str, obj: bpy.types.Object | None, *said: object, hideable: bool = False) -> None:
+        """Sums, as the order of objects is none of theirs. Nobody evaluates what is hidden, least of all after undo."""
+        places = [] if obj is None else [obj.matrix_world]
+        if obj is not None and (hideable or not shown.get(obj.session_uid)):
+            places = [one.matrix_basis for one in _lineage(obj)]
+        place = np.array(places, np.float32).tobytes()
+        sums[part] += int.from_bytes(blake2b(repr(said).encode() + place, digest_size=8).digest())
+
+    add("the light", None, sky_suns(scene))
+    for leaf in leaf_objects(scene).values():
+        add("the meshes", None, (yield from form_steps(leaf)))
+    for obj in in_parts(layer.objects):
         group = obj.tetflora
         if group.is_plant or group.is_field:
-            numbers.append(number)
-            more = (field_kinds(obj), form_of(obj)) if group.is_field else group.skeleton and form_of(group.skeleton)
-            kinds.update(more[0] if group.is_field else (group.species,))
-            seen = obj in shown, obj.hide_render, group.enabled
-            plants.append((group.species, group.seed, group.age, *seen, more))
+            own = field_kinds(obj) if group.is_field else (group.species,)
+            kinds.update(own)
+            said = own, group.seed, group.age, shown.get(obj.session_uid), obj.hide_render, group.enabled
+            form = obj if group.is_field else group.skeleton
+            add("the plants", obj, said, (yield from form_steps(form)) if form else None)
         elif (lamp := obj.type == 'LIGHT') or ((group.is_occluder or may_take_part(obj)) and not is_ours(obj)):
-            where = obj.matrix_world[:], obj.matrix_basis[:]  # what is hidden has but the latter
-            (lights if lamp else meshes).append((obj.name_full, *where, artists_flags(obj), form_of(obj)))
-    for identifier, asset in asset_species(scene).items():
-        if identifier in kinds and asset.object is not None:  # it stands where its plants do
-            meshes.append((identifier, asset.object.matrix_world.to_3x3()[:], form_of(asset.object)))
-        elif identifier in kinds:
-            meshes += [(identifier, o.matrix_world[:], form_of(o)) for o in objects_within(asset.collection)]
-    place = members(layer.objects, "matrix_world", 16)[numbers]
-    order = np.lexsort(place.T[12:])  # the order of objects is none of theirs
-    standing = _digest(np.ascontiguousarray(place[order])), [plants[i] for i in order.tolist()]
-    parts = {"the plants": standing, "the meshes": meshes, "the light": lights}
-    return {name: _digest(repr(part).encode()) for name, part in parts.items()}
-
-
-def _digest(content: bytes | np.ndarray) -> str:
-    return blake2b(content, digest_size=8).hexdigest()
+            said = obj.name_full, artists_flags(obj), (yield from form_steps(obj))
+            add("the light" if lamp else "the meshes", obj, said, hideable=not lamp and may_take_part(obj))
+        yield
+    for identifier, own, parts in [(key, one.object, one.collection) for key, one in asset_species(scene).items()]:
+        if identifier in kinds and own is not None:  # it stands where its plants do
+            turned = own.matrix_world if shown.get(own.session_uid) else own.matrix_basis
+            add("the meshes", None, identifier, turned.to_3x3()[:], (yield from form_steps(own)))
+        for obj in objects_within(parts) if identifier in kinds and own is None else ():
+            add("the meshes", obj, identifier, (yield from form_steps(obj)))
+    return {part: f"{total % 2**64:016x}" for part, total in sums.items()}
 
 
 def _concerns(update: bpy.types.DepsgraphUpdate) -> bool:

@@ -139,8 +139,7 @@ def place_group() -> bpy.types.NodeTree:
         cylinder = graph.xyz(graph.math('COSINE', u * tau), graph.math('SINE', u * tau), along)
         bump = graph.node("ShaderNodeBump", {"Strength": 1.0, "Distance": _REFERENCE, "Height": u})
         cosine = graph.vector('DOT_PRODUCT', bump, graph.outputs("ShaderNodeNewGeometry")["Normal"])
-        sine = graph.math('SQRT', 1.0 - cosine * cosine)
-        cotangent = cosine / graph.math('MAXIMUM', sine, 1e-3)
+        cotangent = cosine / graph.math('MAXIMUM', graph.math('SQRT', 1.0 - cosine * cosine), 1e-3)
         return {
             "Place": cylinder + graph.attribute("tf_color", "Vector") * _SHIFT,
             "Turn": u,
@@ -240,8 +239,7 @@ def _grown(graph: Graph, given: dict[str, Term]) -> dict[str, Term]:
     age, color = given["Age"], given["Color"]
     radii = given["Girth"] / tau
     noise = graph.noise(given["Round"] * (radii * _PATCHES), 4.0, 0.65)[0]
-    normal = graph.outputs("ShaderNodeNewGeometry")["Normal"]
-    damp = graph.step(graph.vector('DOT_PRODUCT', normal, _SHADY), -0.3, 0.9)
+    damp = graph.step(graph.vector('DOT_PRODUCT', graph.outputs("ShaderNodeNewGeometry")["Normal"], _SHADY), -0.3, 0.9)
     height = given["Along"] * radii
     # The foot is damp all around.
     damp = graph.step(height, _SPLASH, 0.0) * 0.6 + damp * graph.step(height, _MOSSY, 0.0)
@@ -441,8 +439,7 @@ def _plates(graph: Graph, place: Place) -> tuple[Term, Term, Term, Term]:
     stair = graph.math('FLOOR', layer) + graph.step(part, 0.0, 0.12)
     height = stair * 0.17 + (fine * 0.5 + graph.parts(plate.off)[2] * -0.35)
     height = solid * 0.8 + height
-    rim = graph.step(part, 0.22, 0.05)
-    lit = rim * 0.14 + (part * -0.08 + (fine * 0.65 + plate.random[1] * 0.28))
+    lit = graph.step(part, 0.22, 0.05) * 0.14 + (part * -0.08 + (fine * 0.65 + plate.random[1] * 0.28))
     red = tones(graph, lit, _RED)
     gray = tones(graph, lit, ((0.15, (0.15, 0.12, 0.105)), (0.5, (0.4, 0.33, 0.29)), (0.9, (0.76, 0.68, 0.62))))
     color = graph.mixed(graph.step(noise * 0.6 + plate.random[2], 0.45, 1.15), red, gray)
@@ -482,8 +479,7 @@ def fibrous(graph: Graph, place: Place) -> tuple[Term, Term]:
 def _brows(graph: Graph, eye: Knot) -> Term:
     """1 in the two lines that sink to both sides of a scar as the trunk grows thicker."""
     side = graph.vector('LENGTH', eye.off * (1.0, 1.0, 0.0))
-    line = abs(side * 0.75 + graph.parts(eye.off)[2] - 0.8)
-    return graph.step(line, 0.34, 0.04) * graph.step(side, 2.7, 1.0)
+    return graph.step(abs(side * 0.75 + graph.parts(eye.off)[2] - 0.8), 0.34, 0.04) * graph.step(side, 2.7, 1.0)
 
 
 def smooth(graph: Graph, place: Place) -> tuple[Term, Term]:

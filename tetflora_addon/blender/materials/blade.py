@@ -53,8 +53,7 @@ _DIGITS = (1187.0, 2039.0, 3121.0)
 class BladeLook:
     """How leaves of a kind look."""
 
-    #: Veins of second order to a leaf's length, on either side of the midrib; 0 for none. Of parallel ones, to the
-    #: length as well.
+    #: Veins of second order to a leaf's length, on either side of the midrib, or parallel ones; 0 for none.
     veins: float
     angle: float  # between them and the midrib, degrees
     #: midrib, lines: How much lighter midrib and veins are in reflected light
@@ -224,8 +223,7 @@ def _dead(graph: Graph, given: dict[str, Term], place: Term, own: Term, noise: T
     """Share of dead tissue: none on most leaves; on a few the tip, the ends of lobes, and spots."""
     worn = (own - (1.0 - given["Wear"])) / graph.math('MAXIMUM', given["Wear"], 1e-3)
     rim = worn * 0.18 + (noise * 0.7 + graph.vector('DISTANCE', place, (0.5, 0.4, 0.0)))
-    edge = graph.step(graph.math('MAXIMUM', rim, noise * 1.6 + -0.2), 0.93, 1.0)
-    return edge * graph.step(worn, 0.0, 0.05)
+    return graph.step(graph.math('MAXIMUM', rim, noise * 1.6 + -0.2), 0.93, 1.0) * graph.step(worn, 0.0, 0.05)
 
 
 def _relief(graph: Graph, given: dict[str, Term], place: Term, dome: Term | None, side: Term) -> bpy.types.Node:

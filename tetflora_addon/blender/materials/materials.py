@@ -94,8 +94,7 @@ def bark_material(species_name: str, character: str = "ridged") -> bpy.types.Mat
         color = graph.attribute("tf_color", "Color")
         bark = graph.outputs("ShaderNodeGroup", {"Color": color}, node_tree=bark_group(character))
         dull = {"Transmission": 0.0, "Gloss": 0.0}
-        normal = graph.outputs("ShaderNodeNewGeometry")["Normal"]
-        young = _scattered(graph, {**dull, "Color": color, "Normal": normal})
+        young = _scattered(graph, {**dull, "Color": color, "Normal": graph.outputs("ShaderNodeNewGeometry")["Normal"]})
         # Light that was scattered before meets the plain bark: nobody sees a pattern in it.
         shown = bark["Shown"] * (1.0 - graph.outputs("ShaderNodeLightPath")["Is Diffuse Ray"])
         for engine, tone in (('CYCLES', graph.scaled(bark["Color"], bark["Gain"])), ('EEVEE', bark["Color"])):
@@ -174,8 +173,7 @@ def baked_material() -> bpy.types.Material:
         side = graph.mixed(geometry["Backfacing"], front, back)
         seen = graph.node("ShaderNodeEmission", {"Color": side, "Strength": 1.0})
         camera = graph.outputs("ShaderNodeLightPath")["Is Camera Ray"]
-        scattered = _scattered(graph, _proxy_looks(graph, geometry["Normal"]))
-        _lead_out(graph, graph.mix(camera, scattered, seen))
+        _lead_out(graph, graph.mix(camera, _scattered(graph, _proxy_looks(graph, geometry["Normal"])), seen))
         cycles = getattr(material, "cycles", None)  # there only while the Cycles add-on is enabled
         if cycles is not None and hasattr(cycles, "emission_sampling"):
             cycles.emission_sampling = 'NONE'
@@ -200,8 +198,7 @@ def _principled(graph: Graph) -> Term:
     color, transmission = graph.attribute("tf_color", "Color"), graph.attribute("tf_transmission", "Fac")
     given = {"Base Color": color, "Roughness": graph.attribute("tf_roughness", "Fac")}
     front = graph.node("ShaderNodeBsdfPrincipled", {**given, "Specular IOR Level": _gloss_left(graph) * 0.5})
-    back = graph.node("ShaderNodeBsdfTranslucent", {"Color": color})
-    return graph.mix(transmission, front, back)
+    return graph.mix(transmission, front, graph.node("ShaderNodeBsdfTranslucent", {"Color": color}))
 
 
 def _scattered(graph: Graph, looks: dict[str, Any]) -> bpy.types.Node:

@@ -308,8 +308,7 @@ def baked_shell_group() -> bpy.types.NodeTree:
                 parts.append(light * (far * last + near * first))
             total = sum(parts[1:], parts[0])
             emission = graph.node("ShaderNodeEmission", {"Color": total, "Strength": given["Strength"]})
-            gray = graph.xyz(*[path.transmittance] * 3)
-            clear = graph.node("ShaderNodeBsdfTransparent", {"Color": gray})
+            clear = graph.node("ShaderNodeBsdfTransparent", {"Color": graph.xyz(*[path.transmittance] * 3)})
             # Not a mix, which would make the emission weaker by the opacity that it contains already.
             added = graph.node("ShaderNodeAddShader", {"Shader": emission, "Shader_001": clear})
             shaders[engine] = added.outputs[0]
@@ -355,8 +354,7 @@ class _Path:
     #: transmittance, depth: e^{−κℓ}, and κℓ
     transmittance: Term
     depth: Term
-    #: levels, slopes: The four barycentric coordinates at the hit, in the order of the vertices, and what they lose a
-    #: meter
+    #: levels, slopes: The four barycentric coordinates at the hit, in the vertices' order, and what they lose a meter
     levels: list[Term]
     slopes: list[Term]
     leaving: Term  # 1 on the faces where the ray leaves

@@ -86,8 +86,7 @@ STEPS |= {'MODULO', 'FLOORED_MODULO', 'WRAP', 'SNAP', 'PINGPONG', 'POWER', 'MINI
 
 
 def _overlay(a: Values, b: Values, t: Values) -> Values:
-    low = a * ((1 - t) + 2 * t * b)
-    return np.where(a < 0.5, low, 1 - ((1 - t) + 2 * t * (1 - b)) * (1 - a))
+    return np.where(a < 0.5, a * ((1 - t) + 2 * t * b), 1 - ((1 - t) + 2 * t * (1 - b)) * (1 - a))
 
 
 def _burn(a: Values, b: Values, t: Values) -> Values:
@@ -164,8 +163,7 @@ def to_hsv(color: Values) -> Values:
 def from_hsv(color: Values) -> Values:
     """RGB of hue, saturation and value."""
     hue, saturation, value = color
-    shift = np.array([0, 4, 2], np.float32).reshape(3, *[1] * hue.ndim)
-    turn = (hue * 6 + shift) % 6
+    turn = (hue * 6 + np.array([0, 4, 2], np.float32).reshape(3, *[1] * hue.ndim)) % 6
     return value * (1 - saturation * (1 - np.clip(np.abs(turn - 3) - 1, 0, 1)))
 
 

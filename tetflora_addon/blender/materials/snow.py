@@ -148,8 +148,7 @@ def _held(graph: Graph, upward: Term, carry: Term | float) -> Term:
     """How white a place is on its side that faces up, 0 to 1, by the vertical component of its normal, of any sign."""
     amount = graph.outputs("ShaderNodeGroup", node_tree=_amount_group())["Snow"]
     noise = graph.noise(graph.outputs("ShaderNodeNewGeometry")["Position"] * _PATCHES, 2.0, 0.6)[0] - 0.5
-    lying = amount * carry * (noise * _UNEVEN + abs(upward))
-    return graph.step(lying, _WHITE - _SOFT, _WHITE + _SOFT)
+    return graph.step(amount * carry * (noise * _UNEVEN + abs(upward)), _WHITE - _SOFT, _WHITE + _SOFT)
 
 
 def _amount_group() -> bpy.types.NodeTree:

@@ -104,8 +104,7 @@ def _image(name: str, colors: Floats, green: Floats) -> bpy.types.Image:
     image = bpy.data.images.new(name, columns, rows, alpha=True)
     image[MARK] = True
     image.alpha_mode = 'CHANNEL_PACKED'
-    encoded = srgb_of(np.clip(colors, 0.0, 1.0))
-    pixels = np.concatenate([encoded, np.clip(green, 0.0, 1.0)[..., None]], axis=2)
+    pixels = np.concatenate([srgb_of(np.clip(colors, 0.0, 1.0)), np.clip(green, 0.0, 1.0)[..., None]], axis=2)
     image.pixels.foreach_set(np.ascontiguousarray(pixels, np.float32).reshape(-1))
     image.pack()
     return image
@@ -121,8 +120,7 @@ def _build(graph: Graph) -> None:
     broad, fine = graph.noise(place, 4.0, scale=1.3)[0], graph.noise(place, 6.0, scale=24.0)[0]
     moved = fine * 0.03 + -0.015  # a little, so that cells get ragged outlines
     inputs = {"Vector": place + graph.xyz(moved, moved, moved), "Scale": 26.0, "Randomness": 1.0}
-    leaves = graph.outputs("ShaderNodeTexVoronoi", inputs)["Color"]
-    each = graph.outputs("ShaderNodeSeparateColor", {"Color": leaves})
+    each = graph.outputs("ShaderNodeSeparateColor", {"Color": graph.outputs("ShaderNodeTexVoronoi", inputs)["Color"]})
     # All factors are 1 on average, so that the mean is that of the map.
     tone = (each["Red"] * 0.9 + 0.55) * (fine * 1.7 + 0.15) * (broad * 0.7 + 0.65)
     warm = each["Green"] * 0.3 + -0.15
@@ -133,8 +131,7 @@ def _build(graph: Graph) -> None:
     patches = broad * 0.5 + graph.noise(place, 5.0, scale=7.0)[0] * 0.5
     inputs = {"Value": patches - (ground["Alpha"] * -0.4 + 0.7), "From Min": -0.05, "From Max": 0.05, "To Max": 0.85}
     share = graph.outputs("ShaderNodeMapRange", inputs, interpolation_type='SMOOTHSTEP')["Result"]
-    height = each["Blue"] * 0.6 + fine
-    bump = graph.node("ShaderNodeBump", {"Strength": 0.8, "Distance": 0.025, "Height": height})
+    bump = graph.node("ShaderNodeBump", {"Strength": 0.8, "Distance": 0.025, "Height": each["Blue"] * 0.6 + fine})
     looks = {"Base Color": graph.mixed(share, brown, grown), "Roughness": 0.95, "Normal": bump}
     surface = graph.node("ShaderNodeBsdfPrincipled", {**looks, "Specular IOR Level": 0.15})
     graph.node("ShaderNodeOutputMaterial", {"Surface": surface})

@@ -266,6 +266,5 @@ def draped_circle(ground: Ground, center: Sequence[float], normal: Sequence[floa
     reach = max(_REACH * radius, _LEAST_REACH)
     z = ground.heights(np.stack([x[:-1], y[:-1]], axis=1), center[2] + reach, center[2] - reach)
     z = np.concatenate([z, z[:1]])
-    tilt = max(abs(normal[2]), 0.2)
-    plane = center[2] - ((x - center[0]) * normal[0] + (y - center[1]) * normal[1]) / tilt
+    plane = center[2] - ((x - center[0]) * normal[0] + (y - center[1]) * normal[1]) / max(abs(normal[2]), 0.2)
     return np.stack([x, y, np.where(np.isfinite(z), z, plane)], axis=1)

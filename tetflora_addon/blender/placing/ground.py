@@ -107,8 +107,7 @@ class Ground:
             if i % _BATCH == 0:
                 yield i / len(places)
             low = self.cast(Vector((x, y, z + _ABOVE)), down)
-            high = self.cast(Vector((x, y, z)), up, abs(z - low[0].z) if low else inf)
-            hit = high or low
+            hit = self.cast(Vector((x, y, z)), up, abs(z - low[0].z) if low else inf) or low
             if hit is not None:
                 out[i] = hit[0].z
         return out

@@ -30,7 +30,8 @@ from ..worker import call_in_thread, run_to_end
 from . import plant_objects
 from .canopy import canopy_steps, is_cover
 from .properties import MOST_EMPTIES, TetFloraLayer
-from .rules import copy_settings, fingerprint, makes_field, read_search, set_grounds
+from .rules import copy_settings, fingerprint, forms_of, grounds_of, makes_field, read_search, set_grounds
+from .terrain import ground_form
 
 NAME = "Scatter"
 
@@ -114,6 +115,7 @@ def make_plants_steps(data: JobData, population: TetFloraLayer, later: Collectio
     population = still_there(data, uid)
     own = [o for o in scene.objects if later and o.tetflora.population in later] + _sorted_out(scene, population)[0]
     search = read_search(scene, depsgraph, population, set(own), above=above)
+    stood_on = forms_of(grounds_of(scene, population), lambda obj: ground_form(obj, depsgraph))
     progress = Progress(0.1, "Looking for places")
     yield progress
     placement = yield from call_in_thread(progress, search.placement)
@@ -146,7 +148,7 @@ def make_plants_steps(data: JobData, population: TetFloraLayer, later: Collectio
     if not made:
         plant_objects.remove_empty_collections()
     population.made, population.message = len(placement), placement.reason
-    population.placed_by = fingerprint(population)
+    population.placed_by, population.stood_on = fingerprint(population), stood_on
     returned = min(returned, len(placement))
     return PlacedPlants(made, len(placement), placement.wanted, placement.reason, returned, placement.erased)
 

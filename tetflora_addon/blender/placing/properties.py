@@ -260,6 +260,7 @@ class TetFloraLayer(bpy.types.PropertyGroup, settings_in(Limits, Rules, **LIVE),
     made: integer("Plants Made", **HIDDEN)
     message: string("Message", **HIDDEN)
     placed_by: string("Placed By", **HIDDEN)  # `rules.fingerprint` of when it was placed
+    stood_on: string("Stood On", **HIDDEN)  # `rules.forms_of` its grounds when it was placed
     erased: string("Erased Places", **HIDDEN)  # as `rules.note_erased` writes it
     covers: string("Covers", **HIDDEN)  # ``uid`` of the population whose ground it covers
 

@@ -9,9 +9,9 @@ those without take what is left. So a riparian wood that is added to a beech for
 """
 
 import json
-from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Generator, Iterable, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
-from functools import lru_cache
+from functools import cache, lru_cache
 from hashlib import blake2b
 from itertools import takewhile
 from math import inf
@@ -31,15 +31,16 @@ from ...planting.site import Limits, Spots, Zone, distance_lines
 from ...planting.wetness import wet_ground
 from ...species.kinds import species_of
 from ..attributes import world_matrix
+from ..runtime import Outlook
 from ..scene.fields import fields_of, read_field
 from ..scene.objects import objects_within
-from ..settings import BIOME, SCATTER, active_in, check_limits, with_identity
+from ..settings import BIOME, SCATTER, active_in, check_limits, rules_of, with_identity
 from ..species.catalog import default_species
 from ..species.edits import catalog, unknown_text
 from .canopy import Above, canopy_of, is_cover, not_of_covers, read_suits
 from .distances import HECTARE, distance_of, weights_of
 from .plant_objects import EMPTIES_UNASKED, plants_of
-from .terrain import MASKS, lines_within, read_ground
+from .terrain import MASKS, ground_form, lies_elsewhere, lines_within, read_ground
 
 #: Settings of a biome's mask, by the names that `read_ground` has for them.
 MASK = ("vertex_group", "invert_group", "image", "invert_image", "uv_layer")
@@ -149,7 +150,7 @@ def _zone(biome: bpy.types.PropertyGroup, grounds: Sequence[bpy.types.Object], d
 BIOME_ONLY = ("gives_way", "slope_softness", "altitude_softness", "path_min", "path_max", "path_softness")
 #: Identity and state of a population; all else are settings, which can be copied and written to files.
 IDENTITY = {
-    *("rna_type", "name", "uid", "frozen", "collection", "made", "message", "placed_by", "erased"),
+    *("rna_type", "name", "uid", "frozen", "collection", "made", "message", "placed_by", "stood_on", "erased"),
     *("mix_index", "add_species"),
     *("distance_from", "covers", "biome", "kind", "field", "source", "data", "shown", "folded"),
     *("limits", "limits_shown"),
@@ -204,8 +205,34 @@ def awaits_update(population: bpy.types.PropertyGroup) -> bool:
         return False
     home, uid, every = population.collection, population.uid, population.id_data.objects
     gone = not (home and home.objects) and len(bpy.data.objects) < 500  # or a draw of panels would take too long
-    outdated = not population.made or population.placed_by != fingerprint(population)
+    outdated = not population.made or population.placed_by != fingerprint(population) or on_changed_ground(population)
     return outdated or (gone and all(o.tetflora.population != uid for o in every))
+
+
+def forms_of(grounds: Iterable[bpy.types.Object], form: Callable[[bpy.types.Object], str]) -> str:
+    """The forms of all grounds of a layer, as `ground_form` gives that of each; empty where one has none."""
+    forms = list(map(form, grounds))
+    return " ".join(forms) if all(forms) else ""
+
+
+def changed_steps(scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer) -> Generator[None, None, set[str]]:
+    """Find layers of which a ground was moved or edited since their plants were placed; returns their identities."""
+    found, form = set(), cache(lambda obj: ground_form(obj, view_layer.depsgraph))
+    kept = ((one.uid, rules_of(one)) for one in scene.tetflora.layers)
+    for uid, before, grounds in [(uid, one.stood_on, grounds_of(scene, one)) for uid, one in kept if one.stood_on]:
+        found |= {uid} if lies_elsewhere(before, forms_of(grounds, form)) else set()
+        yield
+    return found
+
+
+#: What `changed_steps` found, a moment after each change.
+changed_grounds = Outlook(changed_steps)
+register, unregister = changed_grounds.register, changed_grounds.unregister
+
+
+def on_changed_ground(layer: bpy.types.PropertyGroup) -> bool:
+    """Whether a layer is one of them, as it was found last; cheap."""
+    return layer.uid in (changed_grounds.of(layer.id_data, bpy.context.view_layer) or ())
 
 
 def free_seed(scene: bpy.types.Scene, seed: int) -> int:
@@ -303,7 +330,8 @@ def grounds_of(scene: bpy.types.Scene, population: bpy.types.PropertyGroup) -> l
     if getattr(population, "ground_collection", None) is not None:  # stands have none
         named += objects_within(population.ground_collection)
     meshes = dict.fromkeys(o for o in named if o is not None and o.type == 'MESH' and not o.tetflora.is_field)
-    return [o for o in meshes if scene in o.users_scene]
+    there = ((o, scene.objects.get(o.name)) for o in meshes)  # `users_scene` lists all objects
+    return [o for o, found in there if o == found or (found is not None and scene in o.users_scene)]
 
 
 def checked_grounds(scene: bpy.types.Scene, population: bpy.types.PropertyGroup) -> list[bpy.types.Object]:

@@ -10,11 +10,13 @@ import numpy as np
 
 from ...arrays import Floats, Floats32
 from ...errors import SceneError
+from ...growth.hashing import uniform
 from ...planting.plane import Path, Terrain
 from ..attributes import image_pixels, members, mesh_of, read, values_of, world_matrix
 from ..scene.objects import objects_within
 from ..scene.skeletons import spline_chain
 
+_SAME = 1e-5  # of a ground's reach: what single precision may move
 _LUMINANCE = np.array([0.2126, 0.7152, 0.0722], np.float32)  # Rec. 709
 #: Custom property of curves that are paths without a bevel: half their width, meters.
 HALF_WIDTH = "tetflora_half_width"
@@ -30,6 +32,33 @@ def grid_mesh(name: str, points: Floats) -> bpy.types.Mesh:
     mesh = bpy.data.meshes.new(name)
     mesh.from_pydata(points.reshape(-1, 3).tolist(), [], faces.tolist(), shade_flat=False)
     return mesh
+
+
+def ground_form(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph | None) -> str:
+    """Numbers that tell where a ground lies and how it is formed, for `lies_elsewhere`; none of one that is not shown.
+
+    Each vertex has its weight, so that hardly any two forms have the same mean.
+    """
+    if depsgraph is None or obj.mode == 'EDIT' or not obj.visible_get(view_layer=depsgraph.view_layer):
+        return ""
+    evaluated = obj.evaluated_get(depsgraph)
+    with mesh_of(evaluated) as mesh:
+        points, corners, place = read(mesh, "position"), len(mesh.loops), world_matrix(obj, depsgraph)
+    weight = 0.5 + uniform(np.arange(len(points), dtype=np.uint64), 0)
+    mean = (place[:3, :3] @ (weight @ points) + weight.sum() * place[:3, 3]) / max(len(points), 1) ** 0.5
+    reach = np.abs(place[:3, :3]).max() * np.abs(points).max(initial=1e-3) + np.abs(place[:3, 3]).max()
+    return " ".join(map(repr, (float(reach), len(points), corners, *mean.tolist())))
+
+
+def lies_elsewhere(before: str, now: str) -> bool:
+    """Whether grounds lie elsewhere, or are formed otherwise, than before; no where that is not known."""
+    try:
+        then, there = (np.array(text.split(), dtype=np.float64).reshape(-1, 6) for text in (before, now))
+    except ValueError:
+        return False
+    if len(then) != len(there) or not len(there):
+        return min(len(then), len(there)) > 0
+    return bool((np.abs(then - there) > _SAME * there[:, :1] * [np.inf, 0.0, 0.0, 1.0, 1.0, 1.0]).any())
 
 
 @dataclass(frozen=True)

@@ -231,8 +231,7 @@ def _group(kind: str) -> bpy.types.NodeTree:
         stored = graph.node("GeometryNodeInputNamedAttribute", {"Name": MATRIX}, data_type='FLOAT4X4')
         inputs = {"Geometry": given["Geometry"], "Value": stored, "Index": graph.node("GeometryNodeInputIndex")}
         matrix = graph.node("GeometryNodeSampleIndex", inputs, data_type='FLOAT4X4', domain='POINT')
-        turned = graph.node("GeometryNodeSetInstanceTransform", {"Instances": placed, "Transform": matrix})
-        return {"Geometry": turned}
+        return {"Geometry": graph.node("GeometryNodeSetInstanceTransform", {"Instances": placed, "Transform": matrix})}
 
     inputs = (("Geometry", 'Geometry'), (_SOURCE, 'Object' if kind == 'OBJECT' else 'Collection'))
     return node_group(_NAMES[kind], _VERSION, inputs, (("Geometry", 'Geometry'),), build, 'Geometry')
@@ -302,8 +301,7 @@ def add_stand_in(
                 made.modifiers.remove(modifier)
         nodes = [n for n, modifier in enumerate(made.modifiers) if modifier.type == 'NODES']
         if nodes:
-            modifier = made.modifiers.new("Without Instances", 'NODES')
-            modifier.node_group = _bare_group()
+            made.modifiers.new("Without Instances", 'NODES').node_group = _bare_group()
             # Not at the end: adaptive subdivision has to be the last one.
             made.modifiers.move(len(made.modifiers) - 1, nodes[-1] + 1)
     look_like(made, original, results.owners.get(original))

@@ -195,8 +195,7 @@ def spheres_group(material: bpy.types.Material) -> bpy.types.NodeTree:
 
     def build(graph: Graph, given: dict[str, Term]) -> dict[str, Any]:
         named = graph.node("GeometryNodeInputNamedAttribute", {"Name": "radius"}, data_type='FLOAT')
-        inputs = {"Mesh": given["Geometry"], "Radius": named}
-        points = graph.node("GeometryNodeMeshToPoints", inputs, mode='VERTICES')
+        points = graph.node("GeometryNodeMeshToPoints", {"Mesh": given["Geometry"], "Radius": named}, mode='VERTICES')
         # Points made of vertices do not inherit the material.
         return {"Geometry": graph.node("GeometryNodeSetMaterial", {"Geometry": points})}
 

@@ -61,8 +61,7 @@ class Baking:
     def look(self, refined: EmissionInput) -> Generator[float, None, None]:
         """Compute the light; yields the fraction that is done."""
         scene = refined.flora, refined.refinement, refined.camera
-        facets = refined.facet_pixels is not None
-        self.light = yield from baked_light(*scene, self.sources, self.sheets, facets)
+        self.light = yield from baked_light(*scene, self.sources, self.sheets, refined.facet_pixels is not None)
 
     def light_meshes(self) -> Generator[float | None, None, None]:
         """Write the light of meshes; yields the fraction that is done, and None while a thread computes."""

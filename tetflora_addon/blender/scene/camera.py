@@ -217,8 +217,7 @@ def _stereo_views(scene: bpy.types.Scene, camera: Camera, depsgraph: bpy.types.D
         elif stereo.convergence_mode == 'TOE':
             angle = math.atan2(side, away)
             c, s = math.cos(angle), math.sin(angle)
-            turn = np.array([[c, 0.0, s], [0.0, 1.0, 0.0], [-s, 0.0, c]])
-            moved = replace(moved, frame=camera.frame @ turn)
+            moved = replace(moved, frame=camera.frame @ np.array([[c, 0.0, s], [0.0, 1.0, 0.0], [-s, 0.0, c]]))
         found.append(moved)
     return tuple(found)
 

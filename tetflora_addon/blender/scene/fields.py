@@ -431,8 +431,7 @@ def _between(values: NDArray, a: Integers, b: Integers, part: Floats) -> NDArray
 def _turned(rotation: NDArray, a: Integers, b: Integers, part: Floats) -> NDArray:
     """Rotations (3, 3, m) between those of records; those before where a trunk falls."""
     one, other = rotation[:, :, a], rotation[:, :, b]
-    upright = (one[:, 2] * other[:, 2]).sum(axis=0)
-    leans = np.flatnonzero((upright > _STEADY) & (one != other).any(axis=(0, 1)))
+    leans = np.flatnonzero(((one[:, 2] * other[:, 2]).sum(axis=0) > _STEADY) & (one != other).any(axis=(0, 1)))
     if len(leans):
         mixed = one[:, :, leans] + part[leans] * (other[:, :, leans] - one[:, :, leans])
         z = mixed[:, 2] / np.linalg.norm(mixed[:, 2], axis=0)

@@ -128,8 +128,7 @@ def read_world(scene: bpy.types.Scene) -> WorldLight:
         notes.append("the Background strength is linked to nodes and is treated as 1")
     if sum(n.type == 'BACKGROUND' for n in nodes) > 1:
         notes.append("the world has several Background nodes; only the one closest to the output is used")
-    found = _surroundings(background.inputs["Color"], factor, notes)
-    return WorldLight(*found, note="; ".join(notes))
+    return WorldLight(*_surroundings(background.inputs["Color"], factor, notes), note="; ".join(notes))
 
 
 def sky_suns(scene: bpy.types.Scene) -> tuple[Light, ...]:
@@ -207,8 +206,7 @@ def _sky(node: bpy.types.Node, factor: float, turn: float, notes: list[str]) -> 
 
     suns: tuple[Light, ...] = ()
     if getattr(node, "sun_disc", False) and disc.any() and elevation > 0.0:
-        color = disc * node.sun_intensity
-        suns = (Light('SUN', np.zeros(3), -toward, float(node.sun_size), color=color),)
+        suns = (Light('SUN', np.zeros(3), -toward, float(node.sun_size), color=disc * node.sun_intensity),)
     return World.of(radiance), suns
 
 
@@ -218,5 +216,4 @@ def read_sources(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> Sour
     grounds, looks = (o for o in renderable_objects(depsgraph.view_layer) if o.tetflora.is_occluder), Looks()
     colors = [looks.of(ground.active_material, {}).color for ground in grounds]
     ground = np.mean(colors, axis=0) if colors else np.zeros(3)
-    lights = (*read_lights(depsgraph), *world.suns)
-    return Sources(lights, world.world, read_occluders(depsgraph), ground)
+    return Sources((*read_lights(depsgraph), *world.suns), world.world, read_occluders(depsgraph), ground)

@@ -179,6 +179,17 @@ def renderable_objects(view_layer: bpy.types.ViewLayer) -> Iterator[bpy.types.Ob
                 yield obj
 
 
+def renderable_in_parts(view_layer: bpy.types.ViewLayer) -> Iterator[bpy.types.Object]:
+    """The same, of which some may go meanwhile; where collections are hidden in renders, they are listed at once."""
+    homes = [view_layer.layer_collection]
+    for home in homes:
+        homes += home.children
+    hidden = any(home.collection.hide_render for home in homes)
+    del homes, home  # they are gone when the view layer changes
+    every = list(renderable_objects(view_layer)) if hidden else in_parts(view_layer.objects)
+    yield from (obj for obj in every if not obj.hide_render)
+
+
 def takes_part(obj: bpy.types.Object) -> bool:
     """Whether an object is a plant, a field of plants, a mesh that takes part in refinement, or shows assets."""
     group = obj.tetflora
@@ -242,6 +253,12 @@ def objects_within(collection: bpy.types.Collection) -> list[bpy.types.Object]:
     """
     homes = [collection, *collection.children_recursive]
     return list(dict.fromkeys(obj for home in homes for obj in home.objects))
+
+
+def in_parts(objects: bpy.types.bpy_prop_collection, few: int = 5000) -> Iterator[bpy.types.Object]:
+    """Objects of a view layer, of which some may go meanwhile; so few are read from its chain at a time."""
+    for begin in range(0, len(objects), few):
+        yield from filter(None, objects[begin : begin + few])
 
 
 @dataclass(frozen=True)

@@ -23,8 +23,8 @@ from ...stands.grow import Records, StandSettings, grow
 from ...stands.site import StandSite, StandSpecies
 from ..attributes import write
 from ..placing.plant_objects import link_field
-from ..placing.rules import digest, zone_values, zoned
-from ..placing.terrain import read_ground
+from ..placing.rules import digest, forms_of, zone_values, zoned
+from ..placing.terrain import ground_form, read_ground
 from ..runtime import JobData, is_there, job
 from ..scene import fields
 from ..settings import check_limits
@@ -144,7 +144,18 @@ MIXED_WOOD = {
     "hazel": (0.5, 1.0),
 }  # fmt: skip
 #: State of a stand: what does not say how it grows, and what another does not get from it.
-_STATE = {"rna_type", "limits", "limits_shown", "name", "is_grown", "last_year", "plants", "grown_by", "species_index"}
+_STATE = {
+    "rna_type",
+    "limits",
+    "limits_shown",
+    "name",
+    "is_grown",
+    "last_year",
+    "plants",
+    "grown_by",
+    "stood_on",
+    "species_index",
+}
 _OWN = {*_STATE, "biome", "grounds", "species"}
 _MASKS = ("vertex_group", "areas", "paths", "path_distance")
 _PATIENCE = 5.0  # seconds for what the viewport will ask at once
@@ -261,7 +272,10 @@ def _again_steps(data: JobData, field: bpy.types.Object, grounds: list[bpy.types
     soil = Soil(**{name: getattr(stand, name) for name in Soil.__dataclass_fields__})
     settings = StandSettings(**{name: getattr(stand, name) for name in StandSettings.__dataclass_fields__})
     ground = read_ground(grounds, depsgraph, **{name: getattr(stand, name) for name in _MASKS})
-    ground = zoned(depsgraph, stand, grounds, ground)
+    ground, stood_on = (
+        zoned(depsgraph, stand, grounds, ground),
+        forms_of(grounds, lambda obj: ground_form(obj, depsgraph)),
+    )
     site, corner = yield from call_in_thread(progress, stand_site, ground, soil)
     try:
         growing = steps_in_thread(grow(site, members, settings), Progress(0.0, "Growing the stand"))
@@ -288,7 +302,7 @@ def _again_steps(data: JobData, field: bpy.types.Object, grounds: list[bpy.types
     group = field.tetflora
     group.stand.last_year = last
     group.stand_year = min(group.stand_year, last)
-    group.stand.grown_by = stand_settings_now(scene, field)
+    group.stand.grown_by, group.stand.stood_on = stand_settings_now(scene, field), stood_on
     return GrownStand(field, len(records.at(last)), len(records), last)
 
 

@@ -44,6 +44,7 @@ class TetFloraStand(bpy.types.PropertyGroup, settings_in(StandSettings, options=
     last_year: real("Last Year", "Year of the stand's last record", **HIDDEN)
     plants: integer("Plants in Its Year", **HIDDEN)
     grown_by: string("Grown By", **HIDDEN)  # `growing.stand_settings_now` of when it was grown
+    stood_on: string("Stood On", **HIDDEN)  # `rules.forms_of` its grounds then
     biome: string("Biome", **HIDDEN)  # ``uid`` of the biome of which it is a layer
     grounds: list_of(TetFloraGround, "Grounds", "Meshes that the stand grows on")
     species: list_of(TetFloraStandEntry, "Species", "Species of the stand; if empty, a mixed forest of central Europe")

@@ -28,7 +28,7 @@ from ...jobs import Job, Pace
 from ...refinement.loop import Statistics
 from ..job import refine
 from ..job.frame_cache import choices, scene_digest
-from ..job.stored_contents import stored_contents
+from ..job.stored_contents import stored_contents, stored_contents_steps
 from ..main_thread import in_main_thread
 from ..materials.nodes import is_ours, is_own
 from ..placing.plant_objects import prepare_scene
@@ -287,12 +287,11 @@ def _slice(scene: bpy.types.Scene) -> bool:
 
 
 def _view_layer(scene: bpy.types.Scene) -> bpy.types.ViewLayer:
-    windows = bpy.context.window_manager.windows
-    shown = next((window.view_layer for window in windows if window.scene == scene), None)
+    shown = next((window.view_layer for window in bpy.context.window_manager.windows if window.scene == scene), None)
     return shown or scene.view_layers[0]
 
 
-_outlook = Outlook(lambda scene, layer: stored_contents(scene, layer) if has_results(scene) else None)
+_outlook = Outlook(lambda scene, layer: stored_contents_steps(scene, layer) if has_results(scene) else None)
 
 
 def results_made_for(scene: bpy.types.Scene, ask: Callable = stored_contents) -> dict[str, str]:

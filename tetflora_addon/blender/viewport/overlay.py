@@ -113,8 +113,7 @@ def points(preview: Preview) -> gpu.types.GPUBatch:
     """All plants as points with the form and color of their crowns; on another day only colors go to the card."""
     crowns = preview.shapes.crowns
     # What is kept holds the array too: another one cannot come to lie at its address.
-    key = (id(crowns.positions),)
-    _, standing = _kept(preview, "standing", key, lambda: (crowns.positions, _standing(crowns)))
+    _, standing = _kept(preview, "standing", (id(crowns.positions),), lambda: (crowns.positions, _standing(crowns)))
     shown = np.column_stack([as_shown(crowns.looks[:, :3]), crowns.looks[:, 3]])
     made = gpu.types.GPUBatch(type='POINTS', buf=standing)
     made.vertbuf_add(_buffer(look=np.rint(255.0 * np.clip(shown, 0.0, 1.0)).astype(np.uint8)[crowns.kinds]))
@@ -184,8 +183,7 @@ def pyramid(camera: Camera, far: float, color: tuple[float, float, float, float]
     parts = []
     for depth in (camera.near, max(far, 2.0 * camera.near)):
         wide = rim * depth if camera.kind == "PERSP" else rim
-        local = np.concatenate([wide, np.full((4, 1), -depth)], axis=1)
-        parts.append(local @ camera.frame.T + camera.position)
+        parts.append(np.concatenate([wide, np.full((4, 1), -depth)], axis=1) @ camera.frame.T + camera.position)
     ring = [(i, (i + 1) % 4) for i in range(4)]
     edges = [*ring, *((a + 4, b + 4) for a, b in ring), *((i, i + 4) for i in range(4))]
     return batch('LINES', np.concatenate(parts), np.tile(color, (8, 1)), np.array(edges))
@@ -242,8 +240,7 @@ def _draw_plants(preview: Preview) -> None:
         _draw(one, shapes.origin, _faces_shader())
     gpu.state.face_culling_set('NONE')
     if shapes.crowns is not None:
-        dots = _kept(preview, "points", (preview.made,), lambda: points(preview))
-        _draw_points(dots, shapes.origin, eye, least)
+        _draw_points(_kept(preview, "points", (preview.made,), lambda: points(preview)), shapes.origin, eye, least)
     gpu.state.depth_mask_set(False)
 
 
@@ -265,8 +262,7 @@ def _draw_levels(preview: Preview, settings: TetFloraPreview, space: bpy.types.S
         )
         _draw(made, origin)
     if settings.wires:
-        key = (*shown, settings.color)
-        made = _kept(preview, "wires", key, lambda: wires(levels, level, settings.color, forms))
+        made = _kept(preview, "wires", (*shown, settings.color), lambda: wires(levels, level, settings.color, forms))
         _draw(made, origin)
     gpu.state.blend_set('NONE')
 

@@ -209,8 +209,7 @@ class GroundCursor:
         shader.uniform_float("viewportSize", size)
         for points, color in self.lines:
             origin = origin_near(points)
-            near = np.ascontiguousarray(points - origin, np.float32)
-            batch = batch_for_shader(shader, 'LINE_STRIP', {"pos": near})
+            batch = batch_for_shader(shader, 'LINE_STRIP', {"pos": np.ascontiguousarray(points - origin, np.float32)})
             with gpu.matrix.push_pop():
                 gpu.matrix.translate(origin.tolist())
                 # A dark line below makes the bright one seen on any ground.
