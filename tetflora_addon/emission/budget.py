@@ -464,8 +464,7 @@ def coarse_faces(flora: Flora, seeds: Seeds) -> Floats:
     plants = trunks(flora.rows, seeds)
     every, wood = flora.face_counts(plants), flora.branch_faces(plants)
     each = np.array([sum(f.triangles for f in own[0]) / max(sum(f.polygons for f in own[0]), 1) for own in flora.forms])
-    triangles = 2.0 * wood + (every - wood) * each[flora.species_of(plants.row)]
-    return np.array([every.sum(), triangles.sum()])
+    return np.array([every.sum(), (2.0 * wood + (every - wood) * each[flora.species_of(plants.row)]).sum()])
 
 
 def expanded_faces(flora: Flora, seeds: Seeds, camera: Camera) -> Iterator[Floats]:

@@ -342,8 +342,7 @@ class _Tile(Canvas):
         if known:
             return max(expected - self.asked, _EXPECTED / _LAYERS * expected)
         layers = self.frontier.layers()
-        each = (self.asked + _EXPECTED * expected) / (layers + _EXPECTED * _LAYERS)
-        return each * max(_LAYERS - layers, 1.0)
+        return (self.asked + _EXPECTED * expected) / (layers + _EXPECTED * _LAYERS) * max(_LAYERS - layers, 1.0)
 
     def _leave_out(self, number: float) -> None:
         """Leave out so many things, should there be more than allowed.
@@ -439,8 +438,7 @@ class _Tile(Canvas):
     def _hidden(self, facets: Facets) -> Mask:
         """Facets (n,) behind full pixels, also as spheres: those reach nearer, and farther to the sides."""
         cover, spheres = self.coverage, (facets.center.astype(np.float64), facets.side / np.sqrt(np.pi))
-        hidden = cover.hidden(cover.of_corners(triangle_corners(facets))[0])
-        return hidden & cover.hidden(cover.of_spheres(*spheres))
+        return cover.hidden(cover.of_corners(triangle_corners(facets))[0]) & cover.hidden(cover.of_spheres(*spheres))
 
     def _draw_hidden(self, pools: list[Waiting], most: float) -> None:
         """Hidden parts: facets that grow with their depth in the shade, as many as are allowed."""

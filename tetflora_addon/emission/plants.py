@@ -301,8 +301,7 @@ class PlantRows(PlantParts):
             leaf = own_leaf_reaches(flora.rows, flora.leaf.reach)[branches.row] * branches.scale
             solid = flora.rows["envelope"][branches.row] > 0
             ends, across = [lines.knots[:, 0], lines.knots[:, -1]], np.where(solid, across, 0.0) + lines.bend() + leaf
-        own = (getattr(parts, each.name) for each in fields(PlantParts))
-        return cls(*own, *ends, across + branches.radius)
+        return cls(*(getattr(parts, each.name) for each in fields(PlantParts)), *ends, across + branches.radius)
 
 
 @dataclass(frozen=True)
@@ -403,8 +402,7 @@ class GrownPlants(FrontierKind):
         count = (flora.leaf_areas(branches) + flora.wood_areas(branches) / 2) / np.maximum(leaf, 1e-12) ** 2
         weights = self.weights.of_pieces if alone else self.weights.of_subplants
         lit = None if thin is None else light_ratios(flora, branches, leaf, self.camera, self.lights)
-        weight = weights(branches.row, count, leaf_shares(flora, branches))
-        return FacetRules(leaf, side, weight, explicit, lit, thin)
+        return FacetRules(leaf, side, weights(branches.row, count, leaf_shares(flora, branches)), explicit, lit, thin)
 
     def _draw_branches(self, canvas: Canvas, branches: Branches, side: Floats) -> None:
         """Branches alone: leaves that are large are real, wood is tubes or thin triangles, the rest is facets."""
@@ -439,8 +437,8 @@ class GrownPlants(FrontierKind):
     def _draw_twigs(self, canvas: Canvas, species: int, whole: WholeBranches, side: Floats, extent: Floats) -> None:
         """One thin triangle or ribbon each, or of very thin ones wider ones of fewer."""
         branches = whole.branches
-        area = np.pi * branches.radius * branches.length
-        likely = np.clip(area / (TWIG * side[branches.plant] ** 2), 0.02, 1.0)
+        few = TWIG * side[branches.plant] ** 2
+        likely = np.clip(np.pi * branches.radius * branches.length / few, 0.02, 1.0)
         some = np.flatnonzero(uniform(branches.key, _THIN) < likely)
         if not len(some):
             return

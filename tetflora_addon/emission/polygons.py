@@ -167,8 +167,7 @@ class PolygonBlock:
 def kept_polygons(result: Refinement) -> Polygons:
     """Polygons that are kept where shells stand for all others: all in explicit tetrahedra, and large ones."""
     held = result.cell_polygons.polygons
-    proxy = result.chosen(Decision.PROXY, Decision.HIDDEN)[held.cell]
-    kept = np.flatnonzero(~proxy | np.isinf(held.totals.width))
+    kept = np.flatnonzero(~result.chosen(Decision.PROXY, Decision.HIDDEN)[held.cell] | np.isinf(held.totals.width))
     rank = np.zeros(len(result.tree), np.int64)
     rank[result.nodes] = result.rank
     return mended(held.items.take(kept[np.argsort(rank[held.cell[kept]], kind="stable")]))
@@ -181,8 +180,7 @@ def polygon_blocks(polygons: Polygons) -> Iterator[PolygonBlock]:
         own = polygons.take(run)
         surface = own.meshes.surface[own.instance]
         for s in np.unique(surface):
-            buffers = polygon_buffers(own.take(surface == s))
-            yield PolygonBlock(int(s), number, buffers, (number + 1) / len(runs))
+            yield PolygonBlock(int(s), number, polygon_buffers(own.take(surface == s)), (number + 1) / len(runs))
 
 
 def polygon_buffers(polygons: Polygons) -> MeshBuffers:

@@ -399,8 +399,7 @@ def least_weights(view: View, facets: Facets) -> Floats:
     facet, step = spread(np.maximum(high - low + 1, 0))
     # On each line of the lattice, rays from where the last of the sides is entered to where the first is left.
     column = low[facet] + step
-    x = column - center[0][facet]
-    at, slope = by_x[:, facet] * x, by_y[:, facet]
+    at, slope = by_x[:, facet] * (column - center[0][facet]), by_y[:, facet]
     with np.errstate(divide="ignore", invalid="ignore"):
         ends = (largest - at) / slope
     enter = np.where(slope < 0, ends, -np.inf).max(axis=0) + center[1][facet]
@@ -409,9 +408,8 @@ def least_weights(view: View, facets: Facets) -> Floats:
     last = np.floor(np.where(enter <= leave, leave, -1.0)).astype(np.int64)
     line, step = spread(np.maximum(last - first + 1, 0))
     row = first[line] + step
-    y = row - center[1][facet[line]]
     # How many times as large the triangle has to be to reach the ray.
-    scale = (at[:, line] + slope[:, line] * y).max(axis=0)
+    scale = (at[:, line] + slope[:, line] * (row - center[1][facet[line]])).max(axis=0)
     inside = np.flatnonzero(scale <= largest)  # a side along the line has neither been entered nor left
     ray, scale = _ray_numbers(column[line[inside]], row[inside]), scale[inside]
     order = np.argsort(ray, kind="stable")

@@ -87,8 +87,7 @@ def balance(chord: Floats, extinction: Floats, leaf: Floats, facet: Floats) -> F
     """
     chord = np.maximum(chord, 1e-3)
     small, large = _CHORD * extinction * leaf, _CHORD * extinction * np.maximum(facet, leaf)
-    ratio = overlap(small / chord) / overlap(large / chord)
-    return ratio * mean_overlap(large) / mean_overlap(small)
+    return overlap(small / chord) / overlap(large / chord) * mean_overlap(large) / mean_overlap(small)
 
 
 def balanced_colors(color: Floats, hotspot_factor: Floats) -> Floats:

@@ -147,8 +147,7 @@ def pushed_outside_view(facets: Facets, distance_to_view: Callable[[NDArray], ND
     reach, center = CIRCUMRADIUS * facets.side, facets.center
     away = distance_to_view(center)
     if facets.stretch is not None:
-        fits = np.minimum(facets.stretch, away / np.maximum(reach, 1e-12))
-        facets = replace(facets, stretch=np.maximum(fits, 1.0))
+        facets = replace(facets, stretch=np.clip(away / np.maximum(reach, 1e-12), 1.0, np.maximum(facets.stretch, 1.0)))
     short = reach - away
     some = np.flatnonzero((short > 0.0) & (short < _MOST_MOVED * reach))
     if len(some):
@@ -238,8 +237,7 @@ def _leaves_of_subplants(flora: Flora, subplants: Branches, rules: FacetRules) -
     owner = made.owner
     # Sub-plants beyond the limbs know how far outside they are, which holds for all that grows on them.
     outward = np.where(rows["outward"][subplants.row[owner]], points.outward[made.sample], subplants.outward[owner])
-    places = outward, points.young[made.sample]
-    found = _leaf_facets(flora, subplants, made, rules, one, places)
+    found = _leaf_facets(flora, subplants, made, rules, one, (outward, points.young[made.sample]))
     of_day = None if subplants.year is None else _of_kinds(flora, subplants, owner, rows["leaf_kind"][made.row])
     side = found.side if of_day is None else found.side * np.sqrt(of_day)
     return replace(found, side=side, velocity=_carried(flora, subplants, made))

@@ -125,6 +125,5 @@ def facing(facets: Facets, camera: Camera) -> Floats:
 
 
 def _shaded(facets: Facets) -> tuple[Floats32 | None, ...]:
-    optional = facets.velocity, facets.roughness, facets.dull
-    more = (None if own is None else own.astype(np.float32) for own in optional)
+    more = (None if o is None else o.astype(np.float32) for o in (facets.velocity, facets.roughness, facets.dull))
     return facets.color.astype(np.float32), facets.transmission.astype(np.float32), *more
