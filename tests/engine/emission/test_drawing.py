@@ -283,6 +283,7 @@ def test_a_tile_that_may_not_be_finer_is_drawn_once(monkeypatch: pytest.MonkeyPa
     """However much room there is to spare."""
     flora, _, camera, result = wood()
     drawn, usual = [], subject._Tile.draw
+    monkeypatch.setattr("tetflora_addon.processes.pool.number", lambda *_: 0)  # other processes count by themselves
     monkeypatch.setattr(subject._Tile, "draw", lambda self, *given: drawn.append(1) or usual(self, *given))
     support.drawn(flora, result, camera, 1.2, 0.6, most=most)
     assert len(drawn) == subject.tiles_of(camera)
