@@ -51,13 +51,18 @@ def last_tag(root: Path) -> str:
 
 
 def functions(source: str) -> dict[str, str]:
-    """Tests in the source of a file: their text by name (``test_a``, ``TestB::test_c``), decorators included."""
+    """Tests in the source of a file: their text by name (``test_a``, ``TestB::test_c``), decorators included.
+
+    Without docstrings: these say nothing that could fail.
+    """
 
     def found(nodes: list[ast.stmt], prefix: str) -> Iterator[tuple[str, str]]:
         for node in nodes:
             if isinstance(node, ast.ClassDef):
                 yield from found(node.body, f"{prefix}{node.name}::")
             elif isinstance(node, ast.FunctionDef) and node.name.startswith("test_"):
+                if ast.get_docstring(node) is not None:
+                    node.body = node.body[1:] or [ast.Pass()]
                 yield prefix + node.name, ast.unparse(node)
 
     return dict(found(ast.parse(source).body, ""))

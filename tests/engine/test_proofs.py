@@ -62,9 +62,10 @@ def test_tests_run_on_the_code_before_theirs(repository: Path) -> None:
 
 
 def test_a_changed_test_is_one(repository: Path) -> None:
-    """By what it says, not by how it is written or where it stands."""
+    """By its statements, not by how they are written, where they stand and what a docstring says of them."""
     path = repository / "tests" / "engine" / "test_a.py"
     text = path.read_text(encoding="utf-8").replace("code_.one == 1", "code_.one == 3").replace("'n', [", "'n',  [")
+    text = text.replace("def test_a():\n", 'def test_a():\n    """All."""\n')
     path.write_text("# Moved.\n" + text, encoding="utf-8")
     subprocess.run(("git", "commit", "-qam", "changed"), cwd=repository, check=True)
     assert proofs.changed_tests(repository, "HEAD") == ["tests/engine/test_a.py::test_c"]
