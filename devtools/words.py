@@ -54,8 +54,9 @@ _NAMES = {
 }
 _PATTERNS = [(re.compile(old, re.IGNORECASE), new) for old, new in _SPELLING.items()]
 _PATTERNS += [(re.compile(rf"(?<!\w)(?:{old})(?!\w)"), new) for old, new in _NAMES.items()]
-#: Files of foreign words and of others; and units of coordinate systems, as standards spell them, and addresses.
-_FOREIGN = ("tetflora_addon/geodata/*.json", "tests/data/*", "examples/data/*", "LICENSE")
+#: Files of foreign words, of others and of tests by earlier names; and units of coordinate systems, as standards spell
+#: them, and addresses.
+_FOREIGN = ("tetflora_addon/geodata/*.json", "tests/data/*", "examples/data/*", "LICENSE", "devtools/proofs.json")
 _KEPT = re.compile(r"\"m[e]tre\"|https?://\S+")
 
 

@@ -51,9 +51,9 @@ def repository(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 def test_tests_run_on_the_code_before_theirs(repository: Path) -> None:
     """New tests alone, of commits with code; a parameter that fails is enough; the worktree is gone afterward."""
-    found = {name: outcome for _, name, outcome in proofs.proofs(repository, "HEAD~2")}
+    found = {name: outcome for _, name, outcome in proofs.proofs(repository, proofs.since(repository, "HEAD~2"))}
     assert found == {
-        "tests/engine/test_a.py::TestTwo::test_b": "fails",
+        "tests/engine/test_a.py::TestTwo::test_b": "fails (assert 2 in (0, 1))",
         "tests/engine/test_a.py::test_c": "passes",
         "tests/engine/test_d.py::test_d": "fails (cannot be imported)",
     }
@@ -62,9 +62,10 @@ def test_tests_run_on_the_code_before_theirs(repository: Path) -> None:
 
 
 def test_a_changed_test_is_one(repository: Path) -> None:
-    """By what it says, not by how it is written or where it stands."""
+    """By its statements, not by how they are written, where they stand and what a docstring says of them."""
     path = repository / "tests" / "engine" / "test_a.py"
     text = path.read_text(encoding="utf-8").replace("code_.one == 1", "code_.one == 3").replace("'n', [", "'n',  [")
+    text = text.replace("def test_a():\n", 'def test_a():\n    """All."""\n')
     path.write_text("# Moved.\n" + text, encoding="utf-8")
     subprocess.run(("git", "commit", "-qam", "changed"), cwd=repository, check=True)
     assert proofs.changed_tests(repository, "HEAD") == ["tests/engine/test_a.py::test_c"]
@@ -76,7 +77,33 @@ def test_pictures_are_no_code(repository: Path) -> None:
     (repository / "tests" / "engine" / "test_f.py").write_text("def test_f():\n    pass\n", encoding="utf-8")
     for command in (("add", "-A"), ("commit", "-qm", "picture")):
         subprocess.run(("git", *command), cwd=repository, check=True, capture_output=True)
-    assert list(proofs.proofs(repository, "HEAD~1")) == []
+    assert list(proofs.proofs(repository, proofs.since(repository, "HEAD~1"))) == []
+
+
+def test_commits_are_named_one_by_one_or_in_a_file(repository: Path, tmp_path: Path) -> None:
+    """And each is run on its own parent, whatever stood in the worktree before."""
+    listed = tmp_path / "commits"
+    listed.write_text("# Mends.\nHEAD~1 mend\n\n", encoding="utf-8")
+    commits = proofs.named(repository, ["HEAD", f"@{listed}"])
+    assert [len(commit) for commit in commits] == [40, 40]
+    assert [name for _, name, _ in proofs.proofs(repository, commits)] == [
+        "tests/engine/test_a.py::TestTwo::test_b",
+        "tests/engine/test_a.py::test_c",
+        "tests/engine/test_d.py::test_d",
+    ]
+
+
+def test_each_commit_finds_its_parent_alone(repository: Path) -> None:
+    """Nothing of what the one before has left: neither its code nor its tests."""
+    (repository / "code_.py").write_text("one = 1\n", encoding="utf-8")
+    test = repository / "tests" / "engine" / "test_g.py"
+    test.write_text("import code_\ndef test_g():\n    assert not hasattr(code_, 'two')\n", encoding="utf-8")
+    for command in (("add", "-A"), ("commit", "-qm", "back")):
+        subprocess.run(("git", *command), cwd=repository, check=True, capture_output=True)
+    found = [
+        outcome.split()[0] for _, _, outcome in proofs.proofs(repository, proofs.named(repository, ["HEAD~2", "HEAD"]))
+    ]
+    assert found == ["fails", "passes", "fails", "fails"]
 
 
 def test_without_a_tag_it_is_the_last_commit(repository: Path) -> None:

@@ -4,11 +4,14 @@
 
 from __future__ import annotations
 
+import bpy
 import numpy as np
 import pytest
 
 from tests.blender.assets.surfaces import SQUARE, Paint, cards, image, look
+from tests.blender.scenes import add_mesh, depsgraph
 from tetflora_addon.blender.materials.face_looks import FaceReader
+from tetflora_addon.blender.materials.node_values import BLENDS, MATHS
 
 pytestmark = pytest.mark.usefixtures("clean_file")
 
@@ -82,3 +85,62 @@ def test_nodes_that_are_switched_off_let_colors_pass():
     node = _through(paint, paint.node("Invert"))
     node.mute = True
     np.testing.assert_allclose(look(paint)[0][0], (0.5, 0.25, 0.125), atol=0.003)
+
+
+def _of_blender(kind, inputs, **settings):
+    """What a node of Blender's makes of constants, found by geometry nodes."""
+    group = bpy.data.node_groups.new("nodes", 'GeometryNodeTree')
+    group.interface.new_socket("Geometry", in_out='INPUT', socket_type='NodeSocketGeometry')
+    group.interface.new_socket("Geometry", in_out='OUTPUT', socket_type='NodeSocketGeometry')
+    nodes, link = group.nodes, group.links.new
+    node, store = nodes.new(kind), nodes.new("GeometryNodeStoreNamedAttribute")
+    for name, value in settings.items():
+        setattr(node, name, value)
+    given = [socket for socket in node.inputs if socket.enabled]
+    for socket, value in zip(given, inputs, strict=False):
+        socket.default_value = value
+    store.data_type, store.domain = 'FLOAT_VECTOR', 'POINT'
+    store.inputs["Name"].default_value = "found"
+    link(nodes.new("NodeGroupInput").outputs[0], store.inputs["Geometry"])
+    link(next(s for s in node.outputs if s.enabled), next(s for s in store.inputs if s.name == "Value" and s.enabled))
+    link(store.outputs["Geometry"], nodes.new("NodeGroupOutput").inputs[0])
+    point = add_mesh("point")
+    point.modifiers.new("nodes", 'NODES').node_group = group
+    return np.array(point.evaluated_get(depsgraph()).data.attributes["found"].data[0].vector)
+
+
+_COLORS = [
+    ((0.5, 0.25, 0.125), (0.2, 0.9, 0.4), 0.7),
+    ((0.1, 0.0, 0.8), (0.6, 0.6, 0.6), 0.3),
+    ((0.9, 0.4, 0.0), (1.0, 0.0, 0.3), 1.0),
+]
+
+
+def test_all_ways_to_mix_colors_are_those_of_blender():
+    kinds = bpy.types.ShaderNodeMix.bl_rna.properties["blend_type"].enum_items.keys()
+    assert set(kinds) == set(BLENDS)
+    for kind in kinds:
+        for a, b, t in _COLORS:
+            wanted = _of_blender("ShaderNodeMix", [t, (*a, 1), (*b, 1)], data_type='RGBA', blend_type=kind)
+            columns = (np.array(color, np.float32)[:, None] for color in (a, b))
+            found = BLENDS[kind](*columns, np.full(1, t, np.float32))
+            np.testing.assert_allclose(np.ravel(found), wanted, atol=1e-5, err_msg=kind)
+
+
+def _operands(kind):
+    node = bpy.data.node_groups.new("nodes", 'GeometryNodeTree').nodes.new("ShaderNodeMath")
+    node.operation = kind
+    return sum(socket.enabled for socket in node.inputs)
+
+
+def test_operations_of_math_are_those_of_blender():
+    kinds = set(bpy.types.ShaderNodeMath.bl_rna.properties["operation"].enum_items.keys())
+    unknown = {name for name in kinds if name.startswith(("SMOOTH_", "ARC", "TAN", "SINH", "COSH"))}
+    assert kinds - unknown <= set(MATHS)
+    for kind in sorted(kinds & set(MATHS)):
+        for given in ((0.7, 0.4, 0.2), (2.6, 0.5, 0.25), (-1.3, 0.8, 0.1)):
+            operands = [np.full(1, value, np.float32) for value in given[: _operands(kind)]]
+            with np.errstate(all="ignore"):  # as where nodes are read
+                made = MATHS[kind](*operands)
+            wanted = _of_blender("ShaderNodeMath", given, operation=kind)[0]
+            assert float(made[0]) == pytest.approx(wanted, abs=1e-4), (kind, given)

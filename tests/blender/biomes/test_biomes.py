@@ -415,6 +415,16 @@ def test_mutated_files_are_read_or_refused(tmp_path, data):
         assert str(error)
 
 
+@pytest.mark.parametrize("orders", [None, True, 7, "x", {}, [None], [3], [[]]])
+def test_orders_that_are_none_are_refused_where_every_order_is_to_change(tmp_path, orders):
+    data = copy.deepcopy(SMALL)
+    data["species"]["blue_bush"]["orders"] = orders
+    path = tmp_path / "mutated.json"
+    path.write_text(json.dumps(data), encoding="utf-8")
+    with pytest.raises(TetFloraError, match=r'species "blue_bush".*orders'):
+        files.pages_of(scene(), files.read_biome(path))
+
+
 def test_nothing_is_left_of_what_fails(monkeypatch):
     """An unknown species, a broken one, ground where nothing can grow, and Esc in the middle of a layer."""
     land = add_mesh("ground", size=6.0)

@@ -246,7 +246,8 @@ def test_blender_reads_the_plant_with_its_textures(blender, tmp_path, pxr):
     session.clean_file()
     assert bpy.ops.wm.usd_import(filepath=str(tmp_path / "f.usdc")) == {'FINISHED'}
     mesh = next(o.data for o in bpy.data.objects if o.name == "bush_1_LOD0")
-    leaf = members(mesh.polygons, "material_index", dtype=np.int32) == mesh.materials.find("bush_leaf")
+    names = ("bush_leaf", "bush_bark")
+    leaf = members(mesh.polygons, "material_index", dtype=np.int32) == mesh.materials.find(names[0])
     assert leaf.sum() > 1000
     # EEVEE blends what a texture could cut, in any order; and leaves without normals would be smoothed.
     assert {material.surface_render_method for material in mesh.materials} == {'DITHERED'}
@@ -255,6 +256,8 @@ def test_blender_reads_the_plant_with_its_textures(blender, tmp_path, pxr):
     bent = np.linalg.norm(corners - flat, axis=1) > 0.01
     assert not bent[np.repeat(leaf, size)].any()
     assert bent[np.repeat(~leaf, size)].mean() > 0.5
+    mirrors = [mesh.materials[name].node_tree.nodes["Principled BSDF"].inputs["IOR"].default_value for name in names]
+    assert mirrors == pytest.approx([1.445, 1.0], abs=0.02)  # leaves are glossy, less than what is smooth; bark is not
     images = {Path(image.filepath).name: image for image in bpy.data.images if image.size[0]}
     kinds = ("leaf_color", "leaf_normal", "bark_color", "bark_roughness")  # the own bark has no relief
     assert set(images) == {f"bush_{kind}.png" for kind in kinds}

@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from collections import deque
+from types import SimpleNamespace
 
 import bpy
 import numpy as np
@@ -211,6 +212,15 @@ def test_closing_the_job_at_any_step_leaves_the_scene_as_it_was(again):
             assert (ground.hide_render, ground.hide_viewport) == flags
             continue
         break
+
+
+def test_the_material_of_kites_goes_with_what_is_made_before_the_first_of_them():
+    """Esc may come between them."""
+    used = []
+    bound = SimpleNamespace(placed=SimpleNamespace(assets=SimpleNamespace(every=[None])))
+    form = SimpleNamespace(asset_material=lambda: bpy.data.materials.new("leaves"))
+    refine._kites(SimpleNamespace(form=form, bound=bound, results=SimpleNamespace(use=used.extend)), 0)
+    assert used == [bpy.data.materials["leaves"]]
 
 
 def test_an_error_while_writing_loses_nothing(monkeypatch):

@@ -19,11 +19,11 @@ from tetflora_addon.emission import drawing as subject
 from tetflora_addon.emission.budget import fit_to_budget
 from tetflora_addon.emission.coverage import MARGIN, Coverage, Shade
 from tetflora_addon.emission.emitters import FacetForm, facet_blocks
-from tetflora_addon.emission.frontier import Frontier, Waiting
+from tetflora_addon.emission.frontier import Frontier, Waiting, corners_of_faces
 from tetflora_addon.emission.plants import GrownPlants, Transition, expanded_blocks
 from tetflora_addon.growth.growth import trunks
 from tetflora_addon.proxies.facet_weights import facet_weights
-from tetflora_addon.proxies.microsurfaces import Facets
+from tetflora_addon.proxies.microsurfaces import CIRCUMRADIUS, STRETCH, Facets
 from tetflora_addon.proxies.primitives import joined, triangle_corners
 from tetflora_addon.refinement.contents import PlantParts, subplant_totals
 from tetflora_addon.refinement.lights import Light
@@ -373,6 +373,17 @@ def test_a_tile_that_needs_more_than_it_has_is_evenly_coarser(times: float) -> N
     assert sides.max() < 2.0 * np.median(sides)
 
 
+def test_what_a_tile_may_have_is_used_where_less_is_needed_than_expected() -> None:
+    """Pixels that are open tell it in time: a wood had 374,000 primitives of a million, with facets twice as large."""
+    flora, _, camera, result = wood()
+    blocks, facets, seen = support.drawn(flora, result, camera, 3.0, 1.5)
+    most = 1.5 * (sum(block.buffers.polygons for block in blocks) + len(facets))
+    blocks, finer, shown = support.drawn(flora, result, camera, 3.0, 1.5, most=most, finest=0.5)
+    assert 0.8 * most < sum(block.buffers.polygons for block in blocks) + len(finer) <= most
+    sides = [np.median(pixels_of(some, camera)[which]) for some, which in ((facets, seen), (finer, shown))]
+    assert sides[1] < 0.85 * sides[0]
+
+
 def test_sides_that_are_told_are_those_that_are_drawn() -> None:
     """Where more is needed than was expected, the report does not say what was asked for."""
     flora, _, camera, result = wood()
@@ -442,6 +453,22 @@ def test_quarters_are_the_facet_divided() -> None:
         own = parts[k * len(facets) : (k + 1) * len(facets)]
         away = np.linalg.norm(own[:, :, None] - known[:, None], axis=3).min(axis=2)
         assert (away < 1e-3 * facets.side[:, None] + 1e-5).all()
+
+
+def test_facets_are_as_long_as_the_faces_in_whose_place_they_are() -> None:
+    """Wood above all: their longest sides lie along those of the faces, up to what facets of wood are stretched."""
+    buffers = next(b.buffers for b in expanded_blocks(*scene()[:2]) if b.kind == "bark")
+    corners, size = corners_of_faces(buffers)
+    facets = subject._facets_of_faces(corners, size, buffers, np.arange(buffers.polygons))
+    edges = corners[:, [1, 2, 2]] - corners[:, [0, 0, 1]]
+    length = np.linalg.norm(edges, axis=2)
+    every = np.arange(len(length))
+    longest = edges[every, length.argmax(axis=1)] / length.max(axis=1)[:, None]
+    made = triangle_corners(facets).astype(np.float64)
+    reach = np.ptp(np.einsum("nki,ni->nk", made, longest), axis=1)
+    within = (length.max(axis=1) > 1.05 * 1.5 * CIRCUMRADIUS * facets.side) & (facets.stretch < 0.99 * STRETCH)
+    assert within.sum() > 100
+    np.testing.assert_allclose(reach[within], length.max(axis=1)[within], rtol=0.01)
 
 
 def test_every_part_is_decided_once() -> None:

@@ -97,10 +97,12 @@ def test_gltf_has_all_places_and_levels(forest, tmp_path):
 def test_gltf_has_roughness_as_a_number_or_a_texture(forest, tmp_path):
     (tmp_path / "rough.png").write_bytes(png(np.full((2, 2, 3), 0.3, np.float32), linear=True))
     (variant,) = forest.variants
-    rough = replace(variant.surfaces["leaf"], textures={"roughness": "rough.png"})
+    rough = replace(variant.surfaces["leaf"], textures={"roughness": "rough.png"}, gloss=0.02)
     given = replace(variant, surfaces={**variant.surfaces, "leaf": rough})
     list(write_gltf(tmp_path / "f.glb", replace(forest, variants=(given,))))
-    found = {m.name: m.pbrMetallicRoughness for m in pygltflib.GLTF2().load(str(tmp_path / "f.glb")).materials}
+    materials = {m.name: m for m in pygltflib.GLTF2().load(str(tmp_path / "f.glb")).materials}
+    assert materials["bush_leaf"].extensions["KHR_materials_ior"]["ior"] == pytest.approx(rough.index) != 1.0
+    found = {name: m.pbrMetallicRoughness for name, m in materials.items()}
     assert found["bush_bark"].metallicRoughnessTexture is None
     assert found["bush_bark"].roughnessFactor == rough.roughness
     assert found["bush_leaf"].metallicRoughnessTexture is not None

@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from tetflora_addon.planting import strokes
@@ -162,6 +162,9 @@ def test_species_come_in_their_shares_and_sizes_in_their_range():
 
 @settings(max_examples=60, deadline=None)
 @given(seed=st.integers(0, 1000), n=st.integers(0, 120), m=st.integers(0, 40), distance=st.floats(0.01, 4.0))
+# What is close to a place is not the first of its cell, which chance finds once in fifty.
+@example(seed=38, n=120, m=0, distance=1.2)
+@example(seed=4, n=120, m=0, distance=2.0)
 def test_admitted_is_what_one_after_the_other_would_be(seed, n, m, distance):
     rng = np.random.default_rng(seed)
     places, standing = rng.uniform(-5, 5, (n, 2)), rng.uniform(-5, 5, (m, 2))

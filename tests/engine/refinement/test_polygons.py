@@ -255,10 +255,12 @@ def refined(meshes: Meshes, camera: object, **options: float) -> Refinement:
             return stop.value
 
 
-def emitted(result: Refinement, camera: object, facet: float, limit: float = 1e9) -> tuple[list[PolygonBlock], Facets]:
+def emitted(
+    result: Refinement, camera: object, facet: float, limit: float = 1e9, most: float = np.inf
+) -> tuple[list[PolygonBlock], Facets]:
     """Meshes of faces that stay, and facets of all others."""
     flora = support.small_flora()
-    scene = support.refined(flora, result, camera, facet, limit)
+    scene = support.refined(flora, result, camera, facet, limit, most=most)
     assert not list(scene.mesh_blocks())
     facets = [some for parts in scene.facet_parts() for some, _ in parts]
     return list(scene.polygon_blocks()), Facets.concatenate(facets) if facets else Facets.empty()
@@ -366,6 +368,17 @@ def test_large_polygons_stay_whole_among_proxies(shells: bool) -> None:
     assert leaves[0] == pytest.approx(leaves[1], rel=0.4)
     shells = proxy_shells(support.small_flora(), result)
     assert np.isfinite(shells.attributes["tf_kappa"][1]).all()
+
+
+@pytest.mark.parametrize(("number", "size", "most"), [(30, 40.0, np.inf), (60, 400.0, 2000.0)])
+def test_ground_behind_the_eye_is_whole(number: int, size: float, most: float) -> None:
+    """Its faces stay as they are, so none of them can stand for others: a third of it was left."""
+    meshes, camera = rough(number, size), support.camera((0, -6, 2), (0, -60, 2), 160, 1.0)
+    blocks, facets = emitted(refined(meshes, camera), camera, 1.0, 1.0, most=most)
+    ground = Polygons.everything(meshes).areas()[: (number - 1) ** 2].sum()
+    kept = sum(support.face_areas(b.buffers).sum() for b in blocks if b.surface == 0)
+    assert 0.98 * ground < kept + (facets.side**2).sum() < 1.02 * ground
+    assert kept > 0.9 * ground
 
 
 def test_a_budget_leaves_polygons_their_place() -> None:

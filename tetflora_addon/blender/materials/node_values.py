@@ -53,7 +53,7 @@ MATHS: dict[str, Callable[..., Values]] = {
     'DIVIDE': _ratio,
     'MULTIPLY_ADD': lambda a, b, c: a * b + c,
     'POWER': lambda a, b: np.where((a > 0) | (b == np.rint(b)), np.power(np.where(a == 0, 1e-30, a), b), 0),
-    'LOGARITHM': lambda a, b: _ratio(np.log(np.maximum(a, 1e-30)), np.log(np.maximum(b, 1e-30))),
+    'LOGARITHM': lambda a, b: _ratio(np.log(np.where(a > 0, a, 1)), np.log(np.where(b > 0, b, 1))),
     'SQRT': lambda a: np.sqrt(np.maximum(a, 0)),
     'INVERSE_SQRT': lambda a: _ratio(np.float32(1), np.sqrt(np.maximum(a, 0))),
     'ABSOLUTE': np.abs,
