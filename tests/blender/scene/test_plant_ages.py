@@ -240,7 +240,7 @@ def test_young_plants_are_small_in_all_that_knows_them(scene):
 
     def sizes():
         height = np.ptp(levels.read_shapes(scene, depsgraph()).positions[:, 2])
-        stand = forecast._count(scene, bpy.context.view_layer)
+        stand = run_to_end(forecast._count(scene, bpy.context.view_layer))
         above = canopy.canopy_of(scene, depsgraph())[0]
         (mesh,) = run_to_end(plant_mesh.make_plant_mesh_steps(scene, depsgraph(), [plant]))
         tall = mesh.dimensions.z
