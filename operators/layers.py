@@ -124,7 +124,7 @@ class TETFLORA_OT_update_layers(_InParts, Operator, label="Update", needs=_ACTIV
             return "Give the active layer the slim, bare-stemmed trees of a dense stand, or open-grown ones again"
         return cls.bl_description
 
-    def steps(self, context: bpy.types.Context) -> Job[Updated]:
+    def steps(self, context: bpy.types.Context) -> Job[Updated | None]:
         scene, depsgraph = context.scene, context.evaluated_depsgraph_get()
         active, one = layers.active_layer(scene), self.which != 'DUE'
         if self.which == 'WOOD':
@@ -136,10 +136,7 @@ class TETFLORA_OT_update_layers(_InParts, Operator, label="Update", needs=_ACTIV
             return [number for _, number in added.layers], added.bare, added.kept
         uids = [layer.uid for layer in (*layers.children_of(active), active) if layer.kind != BIOME] if one else []
         uids = uids if one else layers.due_layers(scene)
-        if not uids:
-            more = "If a mask, area or path has, choose Update This Layer in the menu beside the list"
-            raise SceneError(f"No setting and no ground has changed since the layers were grown. {more}")
-        return (yield from self._each(scene, depsgraph, uids))
+        return (yield from self._each(scene, depsgraph, uids)) if uids else None
 
     def _each(self, scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, uids: list[str]) -> Job[Updated]:
         made, bare = [], []
@@ -180,7 +177,11 @@ class TETFLORA_OT_update_layers(_InParts, Operator, label="Update", needs=_ACTIV
             layer.erased = ""
         return (reroll_steps if self.reroll else make_plants_steps)(layer.id_data, depsgraph, layer, later)
 
-    def finish(self, context: bpy.types.Context, result: Updated) -> set[str]:
+    def finish(self, context: bpy.types.Context, result: Updated | None) -> set[str]:
+        if result is None:
+            more = "If a mask, area or path has, choose Update This Layer in the menu beside the list"
+            self.report({'INFO'}, f"No setting and no ground has changed since the layers were grown. {more}")
+            return {'CANCELLED'}
         points.schedule()
         context.scene.update_tag()
         made, *rest = result
