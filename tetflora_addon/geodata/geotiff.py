@@ -426,7 +426,8 @@ def _strings(codes: Integers) -> tuple[bytes, bool]:
     length = steps + 1
     start = np.cumsum(length) - length
     code, offset = spread(length)
-    return codes[code[top(start[maker[code]] + offset)]].astype(np.uint8).tobytes(), bool(len(bad))
+    source = start[maker[code]] + offset
+    return codes[code[top(source)]].astype(np.uint8).tobytes(), bool(len(bad))
 
 
 def _packed(data: bytes, most: int) -> bytes:

@@ -314,7 +314,8 @@ def _geometry(blob: Any) -> _Feature | None:
         return None
     if not isinstance(blob, bytes) or blob[:2] != b"GP":
         raise ValueError
-    return None if blob[3] & 16 else _binary(BytesIO(blob[8 + (0, 32, 48, 48, 64)[blob[3] >> 1 & 7] :]))
+    envelope = (0, 32, 48, 48, 64)[blob[3] >> 1 & 7]
+    return None if blob[3] & 16 else _binary(BytesIO(blob[8 + envelope :]))
 
 
 def _binary(file: BytesIO, depth: int = 0) -> _Feature | None:

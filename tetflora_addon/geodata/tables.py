@@ -81,7 +81,8 @@ def read_csv(path: Path, skip: bool = False, most: int | None = None) -> Table:
         text = content.decode("cp1252", errors="replace")
     told = re.match(r"\"?sep=(.)\"?\r?\n", text)
     text, above = (text[told.end() :], 1) if told else (text, 0)
-    delimiter = told[1] if told else max(_DELIMITERS, key=text[: text.find("\n") + 1 or len(text)].count)
+    first = text[: text.find("\n") + 1 or len(text)]
+    delimiter = told[1] if told else max(_DELIMITERS, key=first.count)
     reader = csv.reader(io.StringIO(text, newline=""), delimiter=delimiter, strict=True)
     rows, numbers, broken, wrong = [], [], 0, ""
     try:

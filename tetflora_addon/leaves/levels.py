@@ -456,7 +456,8 @@ def _kite(model: LeafModel, area: float, normal: Floats, fan: tuple[Floats, Floa
     # Moments of a triangle are complete homogeneous polynomials of its corners.
     variance = max((weight * ((x**2).sum(1) + x.sum(1) ** 2)).sum() / 12, 1e-300)
     third = (x**3).sum(1) + x.prod(1) + (x**2 * (x.sum(1)[:, None] - x)).sum(1)
-    widest = float(np.interp((weight * third).sum() / 10 / variance**1.5, _SKEWNESS, _WIDEST))
+    skewness = (weight * third).sum() / 10 / variance**1.5
+    widest = float(np.interp(skewness, _SKEWNESS, _WIDEST))
     length = np.sqrt(18.0 * variance / (1.0 - widest * (1.0 - widest)))
     tip = (2.0 - widest) / 3.0
     # No longer than the model, or bounds would not hold it; and no needle where it is seen along its longer axis.

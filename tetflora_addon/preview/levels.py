@@ -296,7 +296,8 @@ def project(vertices: Floats, extinction: Floats, camera: Camera) -> Projected:
     flat = (total <= 0.0).any(axis=0)
     thickness = np.where(flat, 0.0, thickness)
     front[flat] = vertices[flat, 0]
-    triangles = _CASES[np.where(flat, 0, (weights >= 0.0) @ np.array([1, 2, 4, 8]))]
+    case = (weights >= 0.0) @ np.array([1, 2, 4, 8])
+    triangles = _CASES[np.where(flat, 0, case)]
     owner, which = np.nonzero(triangles[:, :, 0] != _NONE)
     corners = np.concatenate([vertices, front[:, None]], axis=1)
     indices = triangles[owner, which] + 5 * owner[:, None]

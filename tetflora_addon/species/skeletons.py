@@ -510,7 +510,8 @@ def _pipe_radii(points: Floats, parent: Integers) -> Floats:
     """Radii (p,) by the pipe rule, see `skeleton_from_edges`."""
     step = np.linalg.norm(points - points[np.where(parent < 0, np.arange(len(parent)), parent)], axis=1)
     longest = float(longest_way(parent, step).max())
-    wood = np.where(np.bincount(parent[parent >= 0], minlength=len(points)) == 0, _TIP * longest, 0.0)
+    tips = np.bincount(parent[parent >= 0], minlength=len(points)) == 0
+    wood = np.where(tips, _TIP * longest, 0.0)
     for now in levels(parent):
         np.add.at(wood, parent[now], wood[now] + step[now])
     return _ROOT_RADIUS * longest * np.sqrt(wood / wood.max())

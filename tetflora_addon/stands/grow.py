@@ -452,7 +452,8 @@ class SeedDispersal:
         seeds = self.fallen(plants)[:, row * self.columns + column]
         # Light that seedlings need, and that in which they do well, falls with the tolerance of shade.
         least = (0.9 * self.traits.light_compensation)[:, None]
-        able = seeds * np.clip((ground[None, :] - least) / (3.0 * least), 0.0, 1.0) * self.suitability[:, here]
+        lit = np.clip((ground[None, :] - least) / (3.0 * least), 0.0, 1.0)
+        able = seeds * lit * self.suitability[:, here]
         total = able.sum(axis=0)
         chance = total / (total + _HALF)
         if site.plantable is not None:

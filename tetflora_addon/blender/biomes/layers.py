@@ -73,9 +73,8 @@ def is_due(layer: Layer) -> bool:
         field = layer.field
         if field is None or not field.tetflora.stand.grown_by or not has_history(field):
             return False
-        return field.tetflora.stand.grown_by != stand_settings_now(layer.id_data, field) or rules.on_changed_ground(
-            layer
-        )
+        changed = field.tetflora.stand.grown_by != stand_settings_now(layer.id_data, field)
+        return changed or rules.on_changed_ground(layer)
     return awaits_update(layer)
 
 

@@ -37,7 +37,8 @@ def grid_mesh(name: str, points: Floats) -> bpy.types.Mesh:
 def ground_form(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph | None) -> str:
     """Numbers that tell where a ground lies and how it is formed, for `lies_elsewhere`; none of one that is not shown.
 
-    Each vertex has its weight, so that hardly any two forms have the same mean.
+    How far it reaches, meters; its vertices; its corners; and three means of places, meters, times the root of the
+    number of vertices. Each vertex has its weight, so that hardly any two forms have the same mean.
     """
     if depsgraph is None or obj.mode == 'EDIT' or not obj.visible_get(view_layer=depsgraph.view_layer):
         return ""

@@ -145,15 +145,7 @@ MIXED_WOOD = {
 }  # fmt: skip
 #: State of a stand: what does not say how it grows, and what another does not get from it.
 _STATE = {
-    "rna_type",
-    "limits",
-    "limits_shown",
-    "name",
-    "is_grown",
-    "last_year",
-    "plants",
-    "grown_by",
-    "stood_on",
+    *("rna_type", "limits", "limits_shown", "name", "is_grown", "last_year", "plants", "grown_by", "stood_on"),
     "species_index",
 }
 _OWN = {*_STATE, "biome", "grounds", "species"}
@@ -272,10 +264,8 @@ def _again_steps(data: JobData, field: bpy.types.Object, grounds: list[bpy.types
     soil = Soil(**{name: getattr(stand, name) for name in Soil.__dataclass_fields__})
     settings = StandSettings(**{name: getattr(stand, name) for name in StandSettings.__dataclass_fields__})
     ground = read_ground(grounds, depsgraph, **{name: getattr(stand, name) for name in _MASKS})
-    ground, stood_on = (
-        zoned(depsgraph, stand, grounds, ground),
-        forms_of(grounds, lambda obj: ground_form(obj, depsgraph)),
-    )
+    ground = zoned(depsgraph, stand, grounds, ground)
+    stood_on = forms_of(grounds, lambda obj: ground_form(obj, depsgraph))
     site, corner = yield from call_in_thread(progress, stand_site, ground, soil)
     try:
         growing = steps_in_thread(grow(site, members, settings), Progress(0.0, "Growing the stand"))
