@@ -22,6 +22,7 @@ pytestmark = pytest.mark.usefixtures("clean_file")
 def scene(monkeypatch):
     """Two trees, for which a first look is worth its while."""
     monkeypatch.setattr(refine, "_MANY", 1)
+    monkeypatch.setattr(refine, "FIRST_LOOK", 150)
     add_camera(location=(0.0, -60.0, 4.0))
     for i in range(2):
         add_plant(f"tree {i}", seed=i, location=(4.0 * i - 4.0, 500.0 * i, 0.0))
@@ -85,6 +86,15 @@ def test_esc_in_refine_takes_it_away(scene):
     steps.close()
     assert not has_results(scene)
     assert datablocks() == before
+
+
+def test_an_image_that_is_hardly_larger_has_none(scene, monkeypatch):
+    """Of First Forest it took 12 of 46 seconds."""
+    monkeypatch.setattr(refine, "FIRST_LOOK", 160)
+    monkeypatch.setattr(refine, "_first_look", lambda *_: pytest.fail("it takes half as long as all"))
+    for _ in _steps(scene):
+        pass
+    assert has_results(scene)
 
 
 def test_nobody_waits_for_it_in_the_background(scene, monkeypatch):

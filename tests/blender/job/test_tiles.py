@@ -21,6 +21,7 @@ pytestmark = [pytest.mark.usefixtures("clean_file"), pytest.mark.fine]
 def scene(monkeypatch):
     """A far tree on the left, a near one on the right and one beside the image, whose middle tile of three is empty."""
     monkeypatch.setattr(refine, "_MANY", 1)
+    monkeypatch.setattr(refine, "FIRST_LOOK", 150)
     add_camera(location=(0.0, 0.0, 3.0))
     for seed, (x, y) in enumerate(((-14.0, 60.0), (5.0, 25.0), (40.0, 25.0))):
         add_plant(f"tree {seed}", seed=seed, location=(x, y, 0.0))

@@ -380,8 +380,7 @@ def _refine_steps(run: _Run, first_look: bool) -> Job[Statistics]:
     results.origin, results.owners = camera.origin, given.looks
     results.looks = [Kind.read(kind).look for kind in given.species]
     clock.lap("read")
-    progress = Progress(0.02, "Compiling species")
-    yield progress
+    yield (progress := Progress(0.02, "Compiling species"))
     flora = yield from call_in_thread(progress, compile_species, contents.load_for(given.species, scene, depsgraph))
     flora = run.flora = contents.in_wind(scene, flora, camera, given.seeds.motion is not None)
     clock.lap("compile")
@@ -405,7 +404,8 @@ def _refine_steps(run: _Run, first_look: bool) -> Job[Statistics]:
     run.originals = [*given.explicit.originals] if given.explicit is not None and refined else []
     for earlier in result_collections(scene, 'VIEW'):
         adopt_materials(scene, earlier)
-    if first_look and refined and statistics.polygons_full > _MANY and not nobody_waits():
+    large = max(camera.width, camera.height) > 2 * FIRST_LOOK  # or a first look takes half as long as all
+    if first_look and refined and large and statistics.polygons_full > _MANY and not nobody_waits():
         results.first = yield from _first_look(run)
         clock.lap("first look")
     try:
