@@ -242,7 +242,8 @@ class ModalJob(Reporting):
             remember(repr(error), error)
             self.cancel(context)
             raise
-        self._show(context, progress)
+        if self._pace.tells():
+            self._show(context, progress)
         return {'RUNNING_MODAL'}
 
     def cancel(self, context: bpy.types.Context) -> None:

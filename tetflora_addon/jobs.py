@@ -8,10 +8,10 @@ from dataclasses import dataclass, replace
 from typing import Any, Self, TypeVar
 
 _Item, _Step, _Result = TypeVar("_Item"), TypeVar("_Step"), TypeVar("_Result")
-#: What a job works between two redraws, in times of what the last redraw took, and at most, seconds: Esc waits for it.
-_REDRAWS, _LONGEST = 3.0, 1.0
-_SLOW = 0.03  # seconds of a redraw from which on waiting for a thread is no reason for another
-_MOMENT = 0.005  # seconds of sleep while a thread computes
+#: What a job works between two turns of the window, in times of what one after work took; at most; and a slow turn, s.
+_TURNS, _LONGEST, _SLOW = 3.0, 1.0, 0.03
+#: What lies between two changes of what is shown, in times of what drawing one takes; of texts at least and at most, s.
+SPACED, _OFTEN, _SELDOM = 9.0, 0.1, 1.0
 
 
 @dataclass(frozen=True)
@@ -28,8 +28,8 @@ class Progress:
         return replace(self, waiting=True)
 
     def during(self, steps: Generator[object, None, _Result]) -> Generator[Self, object, _Result]:
-        """The same after each of some small steps; returns what these return."""
-        return mapped(steps, lambda _: self)
+        """The same after each of some small steps; true ones let the window draw. Returns what these return."""
+        return mapped(steps, lambda shown: self.repeated if shown else self)
 
 
 #: What yields its progress and returns a result.
@@ -60,7 +60,7 @@ def part_of(
 
 
 class Pace:
-    """How long a job works between two redraws: a window that takes long to draw is drawn less often.
+    """How long a job works between two turns of the window, at once where these are slow, and how often it tells of it.
 
     Parameters
     ----------
@@ -70,24 +70,27 @@ class Pace:
 
     def __init__(self, least: float, most: float = _LONGEST) -> None:
         self._least, self._most, self._left = least, most, time.monotonic()
-        self._begun = self._end = self._left
-        self._slow = False
+        self._begun = self._end = self._next = self._left
+        self._worked, self._told, self._turn = False, False, 0.0
 
     def begin(self) -> None:
-        """Work begins; what has passed since it was left is what a redraw takes."""
-        now = time.monotonic()
-        seconds = min(_REDRAWS * (now - self._left), self._most)
-        self._end, self._slow = now + max(self._least, seconds), seconds > _REDRAWS * _SLOW
+        """Work begins; what has passed since it was left is what the turn took."""
+        turn = (now := time.monotonic()) - self._left
+        self._turn = turn if self._worked else self._turn
+        self._next = now + min(max(SPACED * turn, _OFTEN), _SELDOM) if self._told else self._next
+        self._end = now + max(self._least, min(_TURNS * self._turn, self._most))
+        self._worked = self._told = False
 
     def goes_on(self, progress: Progress) -> bool:
-        """Whether to take another step now, after one; else the window has its turn."""
-        now = time.monotonic()
-        if now < self._end and (self._slow or not progress.waiting):
-            if progress.waiting:
-                time.sleep(_MOMENT)
-            return True
-        self._left = now
-        return False
+        """Whether to take another step now, after one; else the window has its turn, at once where nothing is new."""
+        self._left, self._worked = time.monotonic(), self._worked or not progress.waiting
+        gathers = self._worked and self._turn > _SLOW
+        return self._left < self._end and (gathers or not progress.waiting)
+
+    def tells(self) -> bool:
+        """Whether to tell how far the job is in this turn."""
+        self._told = self._left >= self._next
+        return self._told
 
     def remaining(self, fraction: float, expected: float = 0.0) -> float:
         """Seconds to the end: of what was expected of all or, once that is over, by what is done; 0 if unknown."""

@@ -160,9 +160,8 @@ def _unix_resident() -> int:
 
 def _mac_total() -> int:
     value, length = c_uint64(), c_size_t(sizeof(c_uint64))
-    if ctypes.CDLL(None).sysctlbyname(b"hw.memsize", byref(value), byref(length), None, c_size_t(0)):
-        return 0
-    return value.value
+    failed = ctypes.CDLL(None).sysctlbyname(b"hw.memsize", byref(value), byref(length), None, c_size_t(0))
+    return 0 if failed else value.value
 
 
 def _mac_resident() -> int:

@@ -49,14 +49,56 @@ def test_a_window_that_draws_at_once_has_its_turn_after_each_step(clock: Clock) 
     assert worked(clock, pace, 0.0, waiting=True) == 0.0
 
 
-@pytest.mark.parametrize("waiting", [False, True])
-def test_of_a_slow_window_most_of_the_time_is_work_and_esc_waits_no_longer_than_a_second(
-    clock: Clock, waiting: bool
-) -> None:
+def test_of_a_slow_window_most_of_the_time_is_work_and_esc_waits_no_longer_than_a_second(clock: Clock) -> None:
     pace = Pace(LEAST)
-    assert worked(clock, pace, 0.2, waiting) >= 2.0 * 0.2
-    assert worked(clock, pace, 9.0, waiting) <= 1.0 + STEP
-    assert worked(clock, pace, 0.0, waiting) <= STEP  # soon again
+    worked(clock, pace, 0.0)
+    assert worked(clock, pace, 0.2) >= 2.0 * 0.2
+    assert worked(clock, pace, 9.0) <= 1.0 + STEP
+    assert worked(clock, pace, 0.0) <= STEP  # soon again
+
+
+def test_a_job_that_waits_holds_no_window_however_long_that_takes_to_draw(clock: Clock) -> None:
+    """Nothing is drawn then: the window stood still for up to a second at a time."""
+    pace = Pace(LEAST)
+    worked(clock, pace, 0.0)
+    assert [worked(clock, pace, redraw, waiting=True) for redraw in (2.0, 0.0, 0.5)] == [0.0, 0.0, 0.0]
+
+
+def test_what_is_done_before_a_slow_redraw_is_done_together(clock: Clock) -> None:
+    pace = Pace(LEAST)
+    worked(clock, pace, 0.0)
+    clock.now += 0.5
+    pace.begin()
+    assert pace.goes_on(Progress(0.5, ""))
+    assert pace.goes_on(Progress(0.5, "", waiting=True))
+
+
+def told(clock: Clock, pace: Pace, redraw: float, seconds: float) -> int:
+    """How often a job tells how far it is, where drawing that takes so long."""
+    end, number = clock.now + seconds, 0
+    while clock.now < end:
+        pace.begin()
+        clock.now += LEAST
+        pace.goes_on(Progress(0.5, "", waiting=True))
+        if pace.tells():
+            number += 1
+            clock.now += redraw
+    return number
+
+
+def test_drawing_what_is_told_takes_a_tenth_of_the_time(clock: Clock) -> None:
+    assert 9 <= told(clock, Pace(LEAST), 0.0, 1.0) <= 11
+    assert told(clock, Pace(LEAST), 0.1, 10.0) <= 11
+    assert told(clock, Pace(LEAST), 2.0, 30.0) >= 9  # a view was drawn as well: the text goes on all the same
+
+
+def test_a_small_step_may_let_the_window_draw() -> None:
+    steps = Progress(0.5, "").during(iter_of(None, True, None))
+    assert [step.waiting for step in steps] == [False, True, False]
+
+
+def iter_of(*items: object):
+    yield from items
 
 
 def test_the_time_that_is_left_follows_from_what_is_expected_and_then_from_what_is_done(clock: Clock) -> None:

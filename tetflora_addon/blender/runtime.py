@@ -195,7 +195,7 @@ class Outlook(Generic[_Result]):
         self._pause = max(_QUIET, 30.0 * min(self._took))
         if found != self._found:
             self._found = found
-            redraw()
+            redraw('UI')  # where panels are: views take seconds without a graphics card
         return None
 
     def unregister(self) -> None:

@@ -82,8 +82,7 @@ def checked_canopy(values: Floats32, what: str) -> tuple[Floats32, list[str]]:
     if low > _GROUND:
         raise SceneError(
             f"{what}its values are from {known.min():,.0f} to {known.max():,.0f} m: elevations above the sea, and not "
-            "heights above the ground. Choose the elevations of the ground as Ground Below, or import it as "
-            "terrain"
+            "heights above the ground. Choose the elevations of the ground as Ground Below, or import it as terrain"
         )
     if high > _TALLEST:
         raise SceneError(

@@ -69,12 +69,9 @@ class _Pool:
 _pool = _Pool()
 
 
-def _print(text: str) -> None:
+def tell(text: str) -> object:
+    """Called once, when other processes cannot be used, from any thread; another function may take its place."""
     print(f"TetFlora: warning: {text}", file=sys.stderr, flush=True)
-
-
-#: Called with a text, once, when other processes cannot be used; from any thread.
-tell: Callable[[str], object] = _print
 
 
 def in_processes(

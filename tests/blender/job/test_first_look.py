@@ -22,6 +22,7 @@ pytestmark = pytest.mark.usefixtures("clean_file")
 def scene(monkeypatch):
     """Two trees, for which a first look is worth its while."""
     monkeypatch.setattr(refine, "_MANY", 1)
+    monkeypatch.setattr(refine, "FIRST_LOOK", 150)
     add_camera(location=(0.0, -60.0, 4.0))
     for i in range(2):
         add_plant(f"tree {i}", seed=i, location=(4.0 * i - 4.0, 500.0 * i, 0.0))
@@ -87,6 +88,27 @@ def test_esc_in_refine_takes_it_away(scene):
     assert datablocks() == before
 
 
+def test_an_image_that_is_hardly_larger_has_none(scene, monkeypatch):
+    """Of First Forest it took 12 of 46 seconds."""
+    monkeypatch.setattr(refine, "FIRST_LOOK", 160)
+    monkeypatch.setattr(refine, "_first_look", lambda *_: pytest.fail("it takes half as long as all"))
+    for _ in _steps(scene):
+        pass
+    assert has_results(scene)
+
+
 def test_nobody_waits_for_it_in_the_background(scene, monkeypatch):
     monkeypatch.setattr(refine, "_first_look", lambda *_: pytest.fail("nobody sees it"))
     assert bpy.ops.tetflora.refine() == {'FINISHED'}
+
+
+def test_little_is_spent_on_what_nobody_sees_in_it(scene, monkeypatch):
+    """Of a small image it had half of what the whole result has, and took half of its time."""
+    found, original = [], refine.drawing
+    monkeypatch.setattr(refine, "drawing", lambda *a, **k: found.append(original(*a, **k)) or found[-1])
+    for _ in _steps(scene):
+        pass
+    first, whole = found
+    assert first.facet > whole.facet
+    assert first.hidden >= 4.0 * whole.hidden
+    assert first.shadow > 16.0 and whole.shadow == 0.0

@@ -4,11 +4,14 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import bpy
 import pytest
 
 from tests.blender.scenes import add_camera, add_plant, datablocks
 from tetflora_addon.blender.job import refine
+from tetflora_addon.blender.results import collection
 from tetflora_addon.blender.results.collection import Results, result_collections
 
 pytestmark = [pytest.mark.usefixtures("clean_file"), pytest.mark.fine]
@@ -18,6 +21,7 @@ pytestmark = [pytest.mark.usefixtures("clean_file"), pytest.mark.fine]
 def scene(monkeypatch):
     """A far tree on the left, a near one on the right and one beside the image, whose middle tile of three is empty."""
     monkeypatch.setattr(refine, "_MANY", 1)
+    monkeypatch.setattr(refine, "FIRST_LOOK", 150)
     add_camera(location=(0.0, 0.0, 3.0))
     for seed, (x, y) in enumerate(((-14.0, 60.0), (5.0, 25.0), (40.0, 25.0))):
         add_plant(f"tree {seed}", seed=seed, location=(x, y, 0.0))
@@ -73,6 +77,19 @@ def test_the_nearest_tile_comes_first_and_what_is_outside_last(scene, swaps):
         pass
     assert [tile for tile, *_ in swaps if tile is not None] == [2, 0, 3]
     assert all(lost and got for tile, lost, got in swaps if tile is not None)
+
+
+def test_tiles_that_take_long_to_draw_are_shown_together(scene, swaps, monkeypatch):
+    clock = [1000.0]
+    monkeypatch.setattr(collection, "time", SimpleNamespace(monotonic=lambda: clock[0]))
+    shown, waited = [], []
+    for progress in steps(scene):
+        if progress.waiting and len(swaps) > len(shown):
+            waited.append(len(swaps))
+            clock[0] += 5.0  # the window draws
+        shown = [*swaps]
+    assert waited == [1], "the first tile alone; the others when all is made"
+    assert [tile for tile, *_ in swaps if tile is not None] == [2, 0, 3]
 
 
 def until_one_is_sharp(scene, swaps):

@@ -73,6 +73,22 @@ def test_the_scene_tab_says_where_on_earth_the_scene_lies(epsg, text):
     assert text in [options.get("text") for name, _, options in layout.drawn if name == "label"]
 
 
+def test_a_ground_that_is_not_in_the_scene_is_told_as_missing_with_what_to_do():
+    """Its name stood there as before."""
+
+    def labels():
+        layout = Layout()
+        interface.drawn(layers.TETFLORA_PT_layers, interface._context(), layout)
+        return " ".join(options.get("text") or "" for name, _, options in layout.drawn if name == "label")
+
+    ground = add_mesh("meadow", size=20.0)
+    select(ground)
+    bpy.ops.tetflora.populate(count=3, species="bush", min_distance=0.1)
+    assert "meadow" in labels() and "not in the scene" not in labels()
+    bpy.context.scene.collection.objects.unlink(ground)
+    assert '"meadow" is not in the scene: Use Selected Meshes' in labels()
+
+
 def test_the_wind_says_that_it_is_a_speed():
     speed = bpy.context.scene.tetflora.wind.bl_rna.properties["speed"]
     assert speed.unit == 'VELOCITY'

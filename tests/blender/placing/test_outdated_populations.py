@@ -14,6 +14,7 @@ from tetflora_addon.blender.biomes import layers
 from tetflora_addon.blender.placing import populations, rules
 from tetflora_addon.blender.placing.terrain import ground_form, lies_elsewhere
 from tetflora_addon.blender.viewport import points
+from tetflora_addon.jobs import run_to_end
 
 pytestmark = pytest.mark.usefixtures("clean_file")
 
@@ -323,9 +324,22 @@ def test_a_ground_is_not_looked_at_while_panels_are_drawn(monkeypatch):
     """In a window; what was found last counts."""
     _on_ground('SCATTER')
     monkeypatch.setattr(rules, "ground_form", lambda *_: pytest.fail("looked at a ground"))
-    monkeypatch.setattr(rules.changed_grounds, "of", lambda *_: {_population().uid})
+    monkeypatch.setattr(rules.changed_grounds, "of", lambda *_: {(_population().uid, _population().stood_on)})
     assert layers.is_due(_population())
     monkeypatch.setattr(rules.changed_grounds, "of", lambda *_: None)
+    assert not layers.is_due(_population())
+
+
+@pytest.mark.parametrize("kind", ['SCATTER', 'STAND'])
+def test_after_update_nothing_is_due_at_once_though_grounds_were_not_looked_at_again(monkeypatch, kind):
+    """In a window, marks stayed until the next look."""
+    scene = _on_ground(kind)
+    _set("ground", location=(0.0, 0.0, 2.0))
+    bpy.context.view_layer.update()
+    found = run_to_end(rules.changed_steps(scene, bpy.context.view_layer))
+    monkeypatch.setattr(rules.changed_grounds, "of", lambda *_: found)
+    assert layers.is_due(_population())
+    assert bpy.ops.tetflora.update_layers() == {'FINISHED'}
     assert not layers.is_due(_population())
 
 

@@ -198,6 +198,17 @@ def test_a_slow_first_look_does_not_delay_the_next(monkeypatch):
     assert waits == pytest.approx([0.2, 0.2, 0.3, 0.3, 0.3, 60.0])
 
 
+def test_what_panels_say_draws_no_view_anew(monkeypatch):
+    """Without a graphics card a view takes seconds, and while plants were refined it was drawn for each such text."""
+    drawn, layer = [], bpy.context.view_layer
+    windows = [SimpleNamespace(scene=bpy.context.scene, view_layer=layer)]
+    context = SimpleNamespace(window_manager=SimpleNamespace(windows=windows))
+    monkeypatch.setattr(runtime, "bpy", SimpleNamespace(context=context))
+    monkeypatch.setattr(runtime, "redraw", lambda only="": drawn.append(only))
+    runtime.Outlook(lambda _scene, _layer: "new")._look()
+    assert drawn == ["UI"]
+
+
 def test_grounds_that_are_small_or_scaled_are_mended():
     scene = bpy.context.scene
     small, scaled = add_mesh("small"), add_mesh("scaled", size=10.0)

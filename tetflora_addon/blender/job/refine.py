@@ -61,6 +61,8 @@ from . import contents
 _BATCH = 16
 #: Fraction of the progress bar that the loop takes; the rest is for writing meshes.
 _LOOP_FRACTION = 0.6
+#: Of a first look: sides of what nobody sees over those that are asked for, and pixels down to which shadows go.
+_UNSEEN = 4.0, 64.0
 #: Polygons, were all plants expanded, from which on other processes are started at once.
 _MANY = 1e6
 
@@ -230,7 +232,7 @@ def _write_blocks(
     def write(block: int | Block | Buffers) -> Generator[None, None, Progress]:
         nonlocal progress
         if isinstance(block, int):
-            run.results.begin(block)
+            yield from run.results.begin(block)
         elif isinstance(block, Block):
             progress = yield from write_mesh(block)
         else:
@@ -254,7 +256,7 @@ def _write_blocks(
         return Progress(start + (0.95 - start) * block.fraction, text)
 
     yield from written(_of_all_ages(run, blocks), write, progress)
-    run.results.begin(None)
+    yield from progress.during(run.results.begin(None))
 
 
 def _of_all_ages(run: _Run, blocks: Iterator[int | Block | Buffers]) -> Iterator[int | Block | Buffers]:
@@ -378,8 +380,7 @@ def _refine_steps(run: _Run, first_look: bool) -> Job[Statistics]:
     results.origin, results.owners = camera.origin, given.looks
     results.looks = [Kind.read(kind).look for kind in given.species]
     clock.lap("read")
-    progress = Progress(0.02, "Compiling species")
-    yield progress
+    yield (progress := Progress(0.02, "Compiling species"))
     flora = yield from call_in_thread(progress, compile_species, contents.load_for(given.species, scene, depsgraph))
     flora = run.flora = contents.in_wind(scene, flora, camera, given.seeds.motion is not None)
     clock.lap("compile")
@@ -403,7 +404,8 @@ def _refine_steps(run: _Run, first_look: bool) -> Job[Statistics]:
     run.originals = [*given.explicit.originals] if given.explicit is not None and refined else []
     for earlier in result_collections(scene, 'VIEW'):
         adopt_materials(scene, earlier)
-    if first_look and refined and statistics.polygons_full > _MANY and not nobody_waits():
+    large = max(camera.width, camera.height) > 2 * FIRST_LOOK  # or a first look takes half as long as all
+    if first_look and refined and large and statistics.polygons_full > _MANY and not nobody_waits():
         results.first = yield from _first_look(run)
         clock.lap("first look")
     try:
@@ -530,8 +532,9 @@ def _refined(run: _Run, disc: float) -> Job[EmissionInput]:
     becomes = None if run.baking is not None else form.form(camera, disc, sun_of(refinement.lights))
     view = detail.camera
     how = Transition(flora, view, detail.leaf_limit, detail.tolerance), facet_weights(flora), clusters, given.occluders
-    options = {"facet": detail.facet, "hidden": detail.coarser, "most": detail.most, "finest": detail.finest}
-    with_all = drawing(flora, refinement, *how, form=becomes, shadow=run.settings.shadow_cutoff, **options)
+    larger, shadow = (1.0, run.settings.shadow_cutoff) if run.whole is None else _UNSEEN
+    options = {"facet": detail.facet, "hidden": larger * detail.coarser, "most": detail.most, "finest": detail.finest}
+    with_all = drawing(flora, refinement, *how, form=becomes, shadow=shadow, **options)
     if run.whole is not None:  # as many as that is expected to have
         pixels = run.whole[0].width * run.whole[0].height / (camera.width * camera.height)
         run.tiles = tiles_of(fit_to_budget(refinement, *run.whole, times=pixels).camera)

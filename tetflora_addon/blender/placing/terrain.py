@@ -81,13 +81,11 @@ def lines_of(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> list[Line
     SceneError
         A NURBS curve with a bevel, an extrusion or a fill.
     """
-    evaluated = obj.evaluated_get(depsgraph)
-    half_width = 0.0
+    evaluated, matrix, half_width = obj.evaluated_get(depsgraph), world_matrix(obj, depsgraph), 0.0
     if obj.type == 'CURVE':
         found = _from_edges(evaluated)
         if found is None:
             found = [_from_spline(spline, obj) for spline in obj.data.splines]
-            matrix = world_matrix(obj, depsgraph)
             half_width = obj.data.bevel_depth * float(np.linalg.norm(matrix[:3, :3], axis=0).mean())
     elif obj.type == 'CURVES':
         found = _from_curves(evaluated.data)
@@ -95,7 +93,6 @@ def lines_of(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> list[Line
         return []
     own = obj.get(HALF_WIDTH)
     half_width = max(half_width, own) if isinstance(own, float) else half_width
-    matrix = world_matrix(obj, depsgraph)
     lines = [((points @ matrix[:3, :3].T + matrix[:3, 3])[:, :2], cyclic) for points, cyclic in found if len(points)]
     if not all(np.isfinite(points).all() for points, _ in lines):
         raise SceneError(f'The curve "{obj.name}" has points that are not finite numbers; check its transform')

@@ -2,13 +2,15 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Result collections: what refinement adds to a scene, replaces and clears, and nothing else."""
 
-from collections.abc import Callable, Generator, Hashable, Mapping, Sequence
+import time
+from collections.abc import Callable, Generator, Hashable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Self, TypeVar
 
 import bpy
 
 from ...buffers import MeshBuffers, PointBuffers
+from ...jobs import SPACED
 from ...parameters import within
 from ...species.species import Species
 from ..declare import FIXED, boolean, integer, list_of, pointer_to, string
@@ -36,14 +38,6 @@ class Results:
     """A result collection under construction, which is in no scene until it is finished.
 
     So nobody sees anything twice. A first look gives way tile by tile. `discard` removes all that has no place yet.
-
-    Parameters
-    ----------
-    purpose : {'VIEW', 'RENDER'}
-    mark : str
-        Suffix of all names, where there are results of several cameras at the same time.
-    data : JobData, optional
-        Of the job, which ends when somebody deletes its results.
     """
 
     scene: bpy.types.Scene
@@ -68,6 +62,7 @@ class Results:
         self._held: list[bpy.types.ID] = []
         self._shared: dict[Hashable, bpy.types.ID] = {}
         self._waiting: list[tuple[bpy.types.Object, Species | None]] = []
+        self._complete, self._next = [], 0.0  # tiles that are not shown yet, and when they will be
 
     def open(self) -> None:
         """Make the collection."""
@@ -88,11 +83,16 @@ class Results:
         """Where it takes its place."""
         return self.collection if self.first is None else self.first.collection
 
-    def begin(self, tile: int | None) -> None:
-        """What follows is of a tile, or of none; the one before is complete."""
-        if self.first is not None and self.by_tile and self.tile is not None:
-            self._replace(self.tile)
-        self.tile = tile
+    def begin(self, tile: int | None) -> Iterator[bool]:
+        """What follows is of a tile, or of none. Complete ones are shown as seldom as drawing is slow: true, if now."""
+        now, before, self.tile = time.monotonic(), self.tile, tile
+        if self.first is not None and self.by_tile and before is not None:
+            self._complete.append(before)
+            if now >= self._next:
+                while self._complete:
+                    self._replace(self._complete.pop())
+                yield True
+                self._next = time.monotonic() + SPACED * (time.monotonic() - now)
 
     def _replace(self, tile: int | None) -> None:
         """Show what was made of a tile, in place of what the first look has of it."""

@@ -86,7 +86,7 @@ def _find() -> float | None:
         next(_finding[0])
     except StopIteration:
         _finding.clear()
-        redraw()
+        redraw('UI')
         return _SOON if _wanted else None
     return _SOON
 

@@ -65,7 +65,6 @@ class _State:
     due: float = 0.0
     message: str = ""
     working: bool = False  # in here right now: what changes is our own doing
-    waiting: bool = False  # for a thread that computes
     again: bool = False  # look once more when the job is done
     paused: int = 0  # others that refine
     view: tuple[int, str] = (0, "")  # a scene, and that of the viewport when it was looked at last
@@ -237,7 +236,7 @@ def tick() -> float | None:
             raise
     finally:
         _state.working = False
-    return None if not more else SLICE if _state.waiting else 0.001
+    return 0.001 if more else None
 
 
 def _begin(scene: bpy.types.Scene) -> bool:
@@ -251,7 +250,7 @@ def _begin(scene: bpy.types.Scene) -> bool:
         _state.message = ""
         redraw()
         return False
-    _state.digest, _state.again, _state.waiting = digest, False, False
+    _state.digest, _state.again = digest, False
     _state.made_for, _state.pace = results_made_for(scene), Pace(SLICE, SLICE)
     seen = scene.session_uid in _sharp and has_results(scene)
     coarse = not (seen and alike(_seen.get(scene.session_uid), camera, _away(scene)))
@@ -278,9 +277,8 @@ def _slice(scene: bpy.types.Scene) -> bool:
         redraw()
         _state.due = time.monotonic() + QUIET
         return _state.again
-    _state.waiting = progress.waiting
     text = f"{progress.fraction:.0%}  {progress.message}"
-    if text != _state.message:
+    if text != _state.message and _state.pace.tells():
         _state.message = text
         redraw('UI')  # the view itself may take longer than the slice
     return True
