@@ -476,21 +476,21 @@ class DayTotals:
         which = self.table[branches.row, kind]
         return seasons.expected(self.tables, self.origin, which, branches.year[:, 0], columns)
 
-    def _summed(self, subplants: Branches, each: Floats, column: int) -> Floats:
-        """Sum (n,) over kinds of leaves of what they have in summer (n, k) and the day leaves."""
-        return sum(each[:, kind] * self.left(subplants, kind, column)[0] for kind in self.kinds)
+    def _summed(self, subplants: Branches, each: Floats, column: int, kind: int | None = None) -> Floats:
+        """Sum (n,) over kinds of leaves, or of one, of what they have in summer (n, k) and the day leaves."""
+        return sum(each[:, k] * self.left(subplants, k, column)[0] for k in (self.kinds if kind is None else (kind,)))
 
-    def leaf_areas(self, subplants: Branches, shaped: Floats | float = 1.0) -> Floats:
-        """Area (n,) of leaves at plant scale 1, without the fullness of sub-plants.
+    def leaf_areas(self, subplants: Branches, shaped: Floats | float = 1.0, kind: int | None = None) -> Floats:
+        """Area (n,) of leaves, or of one kind, at plant scale 1, without the fullness of sub-plants.
 
         ``shaped`` (n, k) are factors by kind of leaf, because of crown shapes.
         """
         area = np.einsum("nj,njk->nk", quadratic(subplants.outward), self.area[subplants.row])
-        return self._summed(subplants, area * shaped, seasons.AREA)
+        return self._summed(subplants, area * shaped, seasons.AREA, kind)
 
-    def leaf_counts(self, subplants: Branches) -> Floats:
+    def leaf_counts(self, subplants: Branches, kind: int | None = None) -> Floats:
         """Number (n,) of leaves, likewise."""
-        return self._summed(subplants, self.count[subplants.row], seasons.PRESENT)
+        return self._summed(subplants, self.count[subplants.row], seasons.PRESENT, kind)
 
     def leaf_faces(self, subplants: Branches, shaped: Floats | float = 1.0) -> Floats:
         """Number (n,) of faces of leaves, likewise."""

@@ -146,6 +146,21 @@ class Flora:
         return draw_samples(self.rows, totals.leaf_area[:, 1], _wood_totals(totals), totals.length, some, times)
 
     @_in_summer
+    def of_several_kinds(self) -> Integers:
+        """Species (k,) that bear leaves of several kinds, such as blossoms."""
+        bearing = np.diagonal(self.averages.leaf_area[:, 1]) > 0
+        pairs = np.unique(np.column_stack([self.rows["species"], self.rows["leaf_kind"]])[bearing], axis=0)
+        return np.flatnonzero(np.bincount(pairs[:, 0]) > 1)
+
+    @_in_summer
+    def samples_by_kind(self) -> dict[int, Samples]:
+        """Of these species, `samples` with leaves of one kind alone, by kind."""
+        totals, some = self.averages, np.flatnonzero(np.isin(self.rows["species"], self.of_several_kinds))
+        own = ((kind, totals.leaf_area[:, 1] * (self.rows["leaf_kind"] == kind)) for kind in range(len(LEAF_KINDS)))
+        given = _wood_totals(totals), totals.length, some, 1
+        return {kind: draw_samples(self.rows, area, *given) for kind, area in own if area[some].any()}
+
+    @_in_summer
     def sampled_bound(self) -> Floats:
         """`bounds.sampled_bounds` of all samples (r, 6); unit is the branch's length."""
         return sampled_bounds((self.samples.leaves, self.samples.wood), len(self.rows))
@@ -183,12 +198,12 @@ class Flora:
         """Index (n,) of the species that rows (n,) belong to."""
         return self.rows["species"][row]
 
-    def leaf_areas(self, subplants: Branches) -> Floats:
-        """Expected one-sided area (n,) of the leaves of sub-plants, m²."""
+    def leaf_areas(self, subplants: Branches, kind: int | None = None) -> Floats:
+        """Expected one-sided area (n,) of the leaves of sub-plants, m²; on a day of the year of one kind, if told."""
         if subplants.year is None:
             area = self._at_place(self.area_nodes, subplants) * self._shaped_leaves(subplants)
         else:
-            area = self.day.leaf_areas(subplants, self._shaped_leaves(subplants, kinds=True))
+            area = self.day.leaf_areas(subplants, self._shaped_leaves(subplants, kinds=True), kind)
         return fullness(self.rows, subplants) * area * subplants.scale**2
 
     def leaf_colors(self, subplants: Branches) -> Floats:
@@ -246,10 +261,10 @@ class Flora:
         out[some] = self.shaped_totals.leaves(subplants.take(some), faces, kinds)
         return out
 
-    def one_leaf_area(self, branches: Branches) -> Floats:
-        """Mean one-sided area (n,) of a single leaf of sub-plants, m²; 0 where they have none."""
+    def one_leaf_area(self, branches: Branches, kind: int | None = None) -> Floats:
+        """Mean one-sided area (n,) of a single leaf of sub-plants, m², likewise; 0 where they have none."""
         if branches.year is not None:
-            area, count = self.day.leaf_areas(branches), self.day.leaf_counts(branches)
+            area, count = self.day.leaf_areas(branches, kind=kind), self.day.leaf_counts(branches, kind)
         else:
             area, count = self._at_place(self.area_nodes, branches), self.leaf_count[branches.row]
         return area / np.maximum(count, 1e-300) * branches.scale**2
@@ -408,7 +423,7 @@ def placed_samples(
         light = np.stack([c * light[:, 0] + s * light[:, 1], c * light[:, 1] - s * light[:, 0]], axis=1)
     at, reach, sparse = _moved(rows, own, points.limbs.take(pick[mine]), place[mine], which, light)
     place[mine] = at / length_factors(rows, own.row, own.crown)[which, None]
-    leafy = points is flora.samples.leaves
+    leafy = points is not flora.samples.wood
     share[mine] = _shares(flora, own, points.shares, points.limbs.take(pick[mine]), which, reach, sparse, leafy)
     return place, share
 

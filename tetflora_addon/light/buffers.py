@@ -162,11 +162,6 @@ class LightBuffer:
     def __len__(self) -> int:
         return len(self._pixel)
 
-    @property
-    def nbytes(self) -> int:
-        """Memory of the fragments, bytes."""
-        return sum(value.nbytes for value in vars(self).values() if isinstance(value, np.ndarray))
-
     def transmittance(self, points: Floats, cells: Integers, own_depth: Floats) -> tuple[Floats, Mask]:
         """Fraction of the light that reaches points.
 

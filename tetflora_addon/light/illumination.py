@@ -88,12 +88,6 @@ class Illumination:
         self._ground = np.zeros(3)
         self.ambient = np.zeros((len(clouds), 4, scattering.HARMONICS, 3), np.float32)
 
-    @property
-    def nbytes(self) -> int:
-        """Memory of samples and buffers, bytes."""
-        buffers = [b for lit in self.lamps for b in lit.buffers] + [b for b in self._sky if b is not None]
-        return self.ambient.nbytes + sum(b.nbytes for b in buffers)
-
     def direct(
         self, points: Floats, cells: Integers, sheets: Integers | None = None
     ) -> Iterator[tuple[Floats, Floats]]:

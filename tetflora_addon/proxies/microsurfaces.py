@@ -226,9 +226,20 @@ def _turned(base: Floats, again: Integers, some: Integers) -> None:
 
 
 def _leaves_of_subplants(flora: Flora, subplants: Branches, rules: FacetRules) -> Facets:
-    rows, points = flora.rows, flora.samples.leaves
-    one, all_ = flora.one_leaf_area(subplants), flora.leaf_areas(subplants)
-    made = facet_sites(subplants.key, all_, np.maximum(rules.leaf**2, one), *_PATHS[True], rules.explicit)
+    """Where species bear several kinds of leaves each has its own, as a day leaves another part of each."""
+    several = np.isin(flora.species_of(subplants.row), flora.of_several_kinds)
+    if subplants.year is None or not several.any():
+        return _leaves_of_kind(flora, subplants, rules, flora.samples.leaves, None)
+    found = [(None, flora.samples, ~several), *((kind, own, several) for kind, own in flora.samples_by_kind.items())]
+    given = ((subplants.take(some), rules.take(some), own.leaves, kind) for kind, own, some in found)
+    return Facets.concatenate([_leaves_of_kind(flora, *one) for one in given])
+
+
+def _leaves_of_kind(flora: Flora, subplants: Branches, rules: FacetRules, points: Points, kind: int | None) -> Facets:
+    rows, (path, draw) = flora.rows, _PATHS[True]
+    one, all_ = flora.one_leaf_area(subplants, kind), flora.leaf_areas(subplants, kind)
+    path += (kind or 0) << 32
+    made = facet_sites(subplants.key, all_, np.maximum(rules.leaf**2, one), path, draw, rules.explicit)
     made = _at_samples(flora, points, subplants, made)
     frame = products(made.frame, gathered(points.frame, made.sample).astype(np.float64))
     frame = settled(rows, made.row, frame, points.light[made.sample].astype(np.float64), _SKY)
@@ -238,9 +249,7 @@ def _leaves_of_subplants(flora: Flora, subplants: Branches, rules: FacetRules) -
     # Sub-plants beyond the limbs know how far outside they are, which holds for all that grows on them.
     outward = np.where(rows["outward"][subplants.row[owner]], points.outward[made.sample], subplants.outward[owner])
     found = _leaf_facets(flora, subplants, made, rules, one, (outward, points.young[made.sample]))
-    of_day = None if subplants.year is None else _of_kinds(flora, subplants, owner, rows["leaf_kind"][made.row])
-    side = found.side if of_day is None else found.side * np.sqrt(of_day)
-    return replace(found, side=side, velocity=_carried(flora, subplants, made))
+    return replace(found, velocity=_carried(flora, subplants, made))
 
 
 def _leaf_facets(
@@ -262,18 +271,6 @@ def _leaf_facets(
     side, stretch = np.sqrt(made.area * weight), np.ones(len(owner))
     look = color, flora.leaf.transmission[row]
     return Facets(made.center, across, along, side, *look, stretch=stretch, dull=1.0 - left * (1.0 - dull))
-
-
-def _of_kinds(flora: Flora, subplants: Branches, owner: NDArray, kind: NDArray) -> Floats | None:
-    """Factors (m,) on areas of facets, whose samples are those of summer, by kind of leaf; None where there is one."""
-    if len(flora.day.kinds) < 2:
-        return None
-    out, share = np.zeros(len(owner)), np.maximum(flora.day.leaf_share(subplants), 1e-300)
-    for one in flora.day.kinds:
-        some = np.flatnonzero(kind == one)
-        (left,) = flora.day.left(subplants, int(one), AREA)
-        out[some] = (left / share)[owner[some]]
-    return out
 
 
 def _leaves_of_pieces(

@@ -60,10 +60,9 @@ class Step:
     proxy: int
     hidden: int
     explicit: int
-    #: subplants, pieces and foreign: their contents: sub-plants, pieces of branches, polygons of other meshes.
+    #: subplants and pieces: their contents: sub-plants, pieces of branches.
     subplants: int
     pieces: int
-    foreign: int
     polygons: int  # expected polygons of what is to be explicit
     seconds: float  # wall clock since the loop began
     memory_mb: float  # megabytes of the tree and of what it holds
@@ -494,7 +493,6 @@ def step_of(state: Refinement) -> Step:
         explicit=int(numbers[Decision.EXPLICIT]),
         subplants=subplants,
         pieces=branches,
-        foreign=len(state.cell_polygons) + state.assets.numbers[0],
         polygons=round(float(state.totals.polygons[explicit].sum())),
         seconds=sum(state.seconds.values()),
         memory_mb=(state.tree.nbytes + state.plants.nbytes + state.assets.nbytes + state.cell_polygons.nbytes) / 1e6,

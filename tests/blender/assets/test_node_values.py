@@ -4,14 +4,17 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import bpy
 import numpy as np
 import pytest
 
+from benchmarks import pictures
 from tests.blender.assets.surfaces import SQUARE, Paint, cards, image, look
-from tests.blender.scenes import add_mesh, depsgraph
+from tests.blender.scenes import add_camera, add_mesh, depsgraph, tiny_render
 from tetflora_addon.blender.materials.face_looks import FaceReader
-from tetflora_addon.blender.materials.node_values import BLENDS, MATHS
+from tetflora_addon.blender.materials.node_values import BLENDS, MATHS, NodeValues
 
 pytestmark = pytest.mark.usefixtures("clean_file")
 
@@ -87,7 +90,7 @@ def test_nodes_that_are_switched_off_let_colors_pass():
     np.testing.assert_allclose(look(paint)[0][0], (0.5, 0.25, 0.125), atol=0.003)
 
 
-def _of_blender(kind, inputs, **settings):
+def _of_blender(kind, inputs, prepare=lambda node: None, **settings):
     """What a node of Blender's makes of constants, found by geometry nodes."""
     group = bpy.data.node_groups.new("nodes", 'GeometryNodeTree')
     group.interface.new_socket("Geometry", in_out='INPUT', socket_type='NodeSocketGeometry')
@@ -96,6 +99,7 @@ def _of_blender(kind, inputs, **settings):
     node, store = nodes.new(kind), nodes.new("GeometryNodeStoreNamedAttribute")
     for name, value in settings.items():
         setattr(node, name, value)
+    prepare(node)
     given = [socket for socket in node.inputs if socket.enabled]
     for socket, value in zip(given, inputs, strict=False):
         socket.default_value = value
@@ -144,3 +148,110 @@ def test_operations_of_math_are_those_of_blender():
                 made = MATHS[kind](*operands)
             wanted = _of_blender("ShaderNodeMath", given, operation=kind)[0]
             assert float(made[0]) == pytest.approx(wanted, abs=1e-4), (kind, given)
+
+
+def _followed(kind, inputs, **settings):
+    """The same by the add-on: what it makes of a node in a material, without the limits of colors; None if unknown."""
+    paint, unknown = Paint(), []
+    node = paint.node(kind, **settings)
+    for socket, value in zip([s for s in node.inputs if s.enabled], inputs, strict=False):
+        socket.default_value = value
+    paint.link(next(s for s in node.outputs if s.enabled), paint.shader.inputs["Base Color"])
+    points = SimpleNamespace(uneven=False, unknown=lambda: unknown.append(node))
+    made = NodeValues(points, {}).color(paint.shader, "Base Color", ())
+    return None if unknown else np.ravel(made)
+
+
+_VECTORS = [
+    ((0.7, 0.4, 0.2), (0.3, -0.5, 1.2), (0.1, 0.6, 0.9)),
+    ((-1.3, 2.6, 0.5), (0.8, 0.25, -0.4), (-0.7, 0.2, 0.3)),
+    ((4.2, -0.1, -3.5), (0.0, 1.5, 2.0), (0.5, 0.0, -1.0)),
+]
+
+
+def test_operations_of_vectors_are_those_of_blender():
+    kinds = set(bpy.types.ShaderNodeVectorMath.bl_rna.properties["operation"].enum_items.keys())
+    left_out = {"CROSS_PRODUCT", "PROJECT", "REFLECT", "REFRACT", "FACEFORWARD", "NORMALIZE", "TANGENT"}
+    for kind in sorted(kinds):
+        for given in _VECTORS:
+            inputs = {'SCALE': (given[0], 0.7), 'REFRACT': (*given[:2], 0.7)}.get(kind, given)
+            found = _followed("VectorMath", inputs, operation=kind)
+            assert (found is None) == (kind in left_out), kind
+            if found is not None:
+                wanted = _of_blender("ShaderNodeVectorMath", inputs, operation=kind)
+                np.testing.assert_allclose(found, wanted, atol=1e-4, err_msg=f"{kind} {given}")
+
+
+@pytest.mark.parametrize("kind", ['MINMAX', 'RANGE'])
+@pytest.mark.parametrize("given", [(0.4, 0.0, 1.0), (1.7, -0.5, 0.6), (0.4, 0.9, 0.2), (-2.0, 0.9, 0.2)])
+def test_numbers_are_clamped_as_by_blender(kind, given):
+    wanted = _of_blender("ShaderNodeClamp", given, clamp_type=kind)
+    np.testing.assert_allclose(_followed("Clamp", given, clamp_type=kind), wanted, atol=1e-6)
+
+
+@pytest.mark.parametrize("clamp", [False, True])
+@pytest.mark.parametrize("kind", ['LINEAR', 'SMOOTHSTEP', 'SMOOTHERSTEP'])
+@pytest.mark.parametrize("given", [(0.4, 0.1, 0.8, -1.0, 3.0), (1.4, 1.0, 0.2, 2.0, 0.5), (-0.3, 0.5, 0.5, 0.2, 0.9)])
+def test_ranges_are_mapped_as_by_blender(kind, clamp, given):
+    settings = {"interpolation_type": kind, "clamp": clamp}
+    wanted = _of_blender("ShaderNodeMapRange", given, **settings)
+    np.testing.assert_allclose(_followed("MapRange", given, **settings), wanted, atol=1e-5)
+
+
+def _rendered(node, path):
+    """What a node of a material makes of constants, by a picture: some are in no other trees."""
+    tree, material = node.id_data, next(m for m in bpy.data.materials if m.node_tree == node.id_data)
+    light, output = tree.nodes.new("ShaderNodeEmission"), tree.nodes.new("ShaderNodeOutputMaterial")
+    tree.links.new(next(s for s in node.outputs if s.enabled), light.inputs["Color"])
+    tree.links.new(light.outputs[0], output.inputs["Surface"])
+    output.is_active_output = True
+    add_mesh("plane", size=50.0).data.materials.append(material)
+    add_camera(location=(0.0, -5.0, 5.0), rotation=(0.8, 0.0, 0.0))
+    scene = tiny_render()
+    scene.view_settings.view_transform = 'Raw'
+    pictures.render(scene, path, 1, form='OPEN_EXR')
+    return pictures.read_picture(path)[0, 0, :3]
+
+
+_PLACE, _TURNED = (0.4, 0.2, 0.7), [(0.3, -0.2, 0.4), (0.8, 1.6, 1.25)]
+
+
+@pytest.mark.parametrize(
+    ("kind", "inputs", "settings"),
+    [
+        ("SeparateXYZ", [(0.3, 2.0, 0.9)], {}),
+        ("CombineXYZ", [0.3, 2.0, 0.9], {}),
+        ("SeparateColor", [(0.3, 0.7, 0.9, 1.0)], {}),
+        ("CombineColor", [0.3, 0.7, 0.9], {}),
+        ("RGBToBW", [(0.3, 0.7, 0.9, 1.0)], {}),
+        *[("Mapping", [_PLACE, (-0.3, -0.5, -0.2), *_TURNED], {"vector_type": kind}) for kind in ('POINT', 'TEXTURE')],
+        *[("Mapping", [_PLACE, *_TURNED], {"vector_type": kind}) for kind in ('VECTOR', 'NORMAL')],
+    ],
+)
+def test_what_is_in_materials_alone_is_as_it_is_rendered(kind, inputs, settings, tmp_path):
+    node = Paint().node(kind, **settings)
+    for socket, value in zip([s for s in node.inputs if s.enabled], inputs, strict=True):
+        socket.default_value = value
+    wanted = _rendered(node, tmp_path / "picture.exr")
+    np.testing.assert_allclose(_followed(kind, inputs, **settings), wanted, atol=1e-3)
+
+
+def test_curves_are_those_of_blender():
+    """By numbers within the curve's ends, which is where tables of it lie."""
+
+    def bent(node):
+        curve = node.mapping.curves[0 if node.type == 'CURVE_FLOAT' else 3]
+        curve.points.new(0.3, 0.8)
+        node.mapping.update()
+
+    for kind, color in (("FloatCurve", 0.45), ("RGBCurve", (0.1, 0.45, 0.9, 1.0))):
+        inputs = [0.6, color]
+        paint = Paint()
+        node = paint.node(kind)
+        bent(node)
+        for socket, value in zip(node.inputs, inputs, strict=True):
+            socket.default_value = value
+        paint.link(node.outputs[0], paint.shader.inputs["Base Color"])
+        found = NodeValues(SimpleNamespace(uneven=False), {}).color(paint.shader, "Base Color", ())
+        wanted = _of_blender(f"ShaderNode{kind}", inputs, prepare=bent)
+        np.testing.assert_allclose(np.ravel(found), wanted, atol=2e-3, err_msg=kind)

@@ -281,3 +281,29 @@ def test_files_from_before_there_were_layers_open_with_all_of_them(tmp_path):
     assert layers.active_layer(bpy.context.scene).name == "alone"
     assert [entry.object.name for entry in _group().layers[-1].grounds] == ["ground"]
     assert not {"populations", "biomes"} & set(stored_properties(bpy.context.scene)["tetflora"].keys())
+
+
+def test_a_copy_of_a_stand_has_its_plants_and_is_due_on_another_ground():
+    ground = _ground(size=12.0)
+    group = _group().stand
+    group.years, group.interval, group.density = 8, 4, 1500.0
+    group.species.add().species = "birch"
+    assert _ops().grow_stand() == {'FINISHED'}
+    source = layers.active_layer(bpy.context.scene).field
+    number = len(source.data.vertices)
+    _ops().duplicate_layer()
+    copy = layers.active_layer(bpy.context.scene).field
+    assert copy is not source and copy.data is not source.data
+    assert len(copy.data.vertices) == number > 0
+    assert copy.tetflora.stand.grown_by == source.tetflora.stand.grown_by
+    assert [entry.object for entry in copy.tetflora.stand.grounds] == [ground]
+    hill = add_mesh("hill", size=6.0)
+    select(hill)
+    _ops().duplicate_layer(to_selected=True)
+    moved = layers.active_layer(bpy.context.scene).field
+    assert [entry.object for entry in moved.tetflora.stand.grounds] == [hill]
+    assert layers.is_due(layers.active_layer(bpy.context.scene))
+    assert _ops().update_layers() == {'FINISHED'}
+    grown = layers.active_layer(bpy.context.scene).field
+    assert max(abs(value) for vertex in grown.data.vertices for value in vertex.co[:2]) <= 6.5
+    assert len(source.data.vertices) == number

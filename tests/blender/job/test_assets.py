@@ -11,11 +11,13 @@ import bpy
 import numpy as np
 import pytest
 
+from benchmarks import pictures
 from tests.blender.assets.scatters import Nodes, scattered, species
 from tests.blender.scenes import add_camera, add_mesh, add_plant, datablocks, depsgraph
 from tests.engine.assets import trees
 from tetflora_addon import storage
 from tetflora_addon.assets import asset_cache
+from tetflora_addon.assets.costs import AssetCosts
 from tetflora_addon.blender.compat import eevee_engine
 from tetflora_addon.blender.job import contents, refine
 from tetflora_addon.blender.results.collection import has_results
@@ -38,7 +40,9 @@ def birch(name="birch", count=500, **options):
     one = trees.tree(1, count, **options)
     offsets = np.flatnonzero(np.diff(one.face, prepend=-1))
     triangles = one.triangles.tolist()
-    faces = [[*triangles[first], triangles[first + 1][2]] for first in offsets.tolist()]
+    faces = triangles
+    if len(triangles) == 2 * len(offsets):  # leaves that are not closed are quads
+        faces = [[*triangles[first], triangles[first + 1][2]] for first in offsets.tolist()]
     mesh = bpy.data.meshes.new(name)
     mesh.from_pydata(one.positions.tolist(), [], faces)
     mesh.materials.append(bpy.data.materials.new("bark and leaf"))
@@ -368,3 +372,42 @@ def test_facets_of_scatterers_that_look_otherwise_are_apart():
     run(scene)
     made = [o for o in scene.objects if o.get("tetflora_kind") == "proxy"]
     assert {(o.is_holdout, o.pass_index) for o in made} == {(True, 5), (False, 0)}
+
+
+def _covered(scene, path):
+    """Part of each pixel that trees cover."""
+    scene.render.film_transparent, scene.render.engine = True, 'CYCLES'
+    scene.tetflora.refine_at_render = False
+    scene.render.image_settings.color_mode = 'RGBA'
+    pictures.render(scene, path, 16)
+    return pictures.read_picture(path)[:, :, 3]
+
+
+def _faces(mesh):
+    """Places and areas (n, 4) of the faces of a mesh, sorted."""
+    found = np.array([(*p.center, p.area) for p in mesh.polygons])
+    return found[np.lexsort(found.round(4).T)]
+
+
+@pytest.mark.parametrize("closed", [False, True])
+def test_clusters_are_faces_of_the_original_where_they_were(closed, monkeypatch, tmp_path):
+    """So they are drawn where memory has no room for originals; small leaves are kites if they have many faces."""
+    scene, _, tree = forest(away=8.0, count=6000, closed=closed)
+    before = [matrix for _, matrix in shown()]
+    picture = _covered(scene, tmp_path / "before.png")
+    monkeypatch.setattr(AssetCosts, "plain", lambda *_: False)
+    statistics = run(scene)
+    assert statistics.instances_whole == 0 and statistics.instances_clusters == len(shown()) > 0
+    for mesh, matrix in shown():
+        assert mesh.startswith("birch ")
+        assert min(np.abs(matrix - other).max() for other in before) < 1e-4
+    used = {mesh for mesh, _ in shown()}
+    kites, own = ({mesh for mesh in used if ("kites" in mesh) == of} for of in (True, False))
+    assert bool(kites) == closed
+    faces = np.concatenate([_faces(bpy.data.meshes[mesh]) for mesh in own])
+    every = _faces(tree.data)
+    assert len(faces) == statistics.polygons_meshed <= len(every)
+    nearest = np.array([np.abs(every - face).max(axis=1).argmin() for face in faces[::37]])
+    np.testing.assert_allclose(faces[::37], every[nearest], atol=1e-4)
+    assert len(np.unique(faces.round(5), axis=0)) >= 0.999 * len(faces)  # none is in two clusters
+    assert _covered(scene, tmp_path / "after.png").mean() == pytest.approx(picture.mean(), rel=0.04)

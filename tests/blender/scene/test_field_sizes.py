@@ -17,10 +17,11 @@ from tetflora_addon.blender.scene.fields import read_aged_field
 from tetflora_addon.blender.scene.plants import read_asset_plants, read_plants
 from tetflora_addon.blender.species.asset_species import asset_species
 from tetflora_addon.compiled.flora import compile_species
-from tetflora_addon.compiled.recorded_sizes import fits_of, measure_of
+from tetflora_addon.compiled.recorded_sizes import fits_of, heights, measure_of
 from tetflora_addon.compiled.sizes import measured
 from tetflora_addon.growth.growth import radius_at, trunks
 from tetflora_addon.growth.seeds import BASE, EAST, LEAVES, THICKNESS
+from tetflora_addon.species.ages import ages_of
 from tetflora_addon.species.catalog import load_species
 from tetflora_addon.species.kinds import Kind
 
@@ -286,3 +287,27 @@ def test_sizes_without_prefix_and_zeros_say_nothing():
     assert before.crown is None
     assert set(plants().identifiers) == set(before.identifiers) == {"birch"}
     assert plants().crown is None
+
+
+def test_a_dead_tree_is_old_and_as_small_in_what_has_no_dead_kinds():
+    """Plain fields know ages, not years since death: what died young has the years of the dead, and its own height."""
+    species = load_species("beech")
+    field_of(
+        3,
+        kinds=("beech",),
+        seed=('INT', np.arange(3)),
+        tf_height=('FLOAT', [12.0, 12.0, 20.0]),
+        tf_diameter=('FLOAT', [0.12, 0.12, 0.3]),
+        tf_dead=('FLOAT', [0.0, 6.0, 6.0]),
+    )
+    read = plants()
+    dead = np.array([Kind.read(read.identifiers[n]).dead for n in read.species])
+    assert (dead > 0.0).tolist() == [False, True, True]
+    plain, ages = plainly_aged(bpy.context.scene, read, None, None)
+    assert set(plain.identifiers) == {"beech"}
+    np.testing.assert_allclose(ages[1:], ages_of(species).lifespan + dead[1:])
+    assert 0.0 < ages[0] < ages_of(species).lifespan
+    found = []
+    for seeds, years in ((read, [Kind.read(read.identifiers[n]).age for n in read.species]), (plain, ages)):
+        found.append(seeds.scale * heights(species, np.array(years)))
+    np.testing.assert_allclose(*found, rtol=1e-6)

@@ -386,3 +386,24 @@ def test_rotations_to_quaternions_and_back():
     frames = np.concatenate([frames, [np.diag(d) for d in ((1, 1, 1), (1, -1, -1), (-1, 1, -1), (-1, -1, 1))]])
     back = scene_fields._from_quaternions(np.ascontiguousarray(quaternions(frames).T))
     assert np.allclose(back.transpose(2, 0, 1), frames, atol=1e-9)
+
+
+def test_trunks_lean_evenly_from_record_to_record_and_fall_at_once():
+    """What leans stays upright enough to be turned; a trunk that lies in the next record stands until then."""
+    rng = np.random.default_rng(3)
+    turns = [
+        Euler((lean, 0.0, spin)).to_matrix()
+        for lean, spin in zip([0.0, 0.1, 0.4, 0.5, 0.4, 1.5], rng.random(6), strict=True)
+    ]
+    rotation = np.array(turns, np.float64).transpose(1, 2, 0)  # (3, 3, records)
+    a, b = np.array([0, 1, 2, 4]), np.array([1, 2, 3, 5])
+    for part in (0.0, 0.25, 1.0):
+        made = scene_fields._turned(rotation, a, b, np.full(4, part))
+        square = np.einsum("ikn,jkn->nij", made, made)
+        np.testing.assert_allclose(square, np.tile(np.eye(3), (4, 1, 1)), atol=1e-6)
+        assert np.linalg.det(made.transpose(2, 0, 1)) == pytest.approx(np.ones(4))
+        axis = rotation[:, 2]
+        between = (1.0 - part) * axis[:, a] + part * axis[:, b]
+        np.testing.assert_allclose(made[:, 2, :3], (between / np.linalg.norm(between, axis=0))[:, :3], atol=1e-6)
+        np.testing.assert_array_equal(made[:, :, 3], rotation[:, :, 4])
+    assert np.array_equal(scene_fields._turned(rotation, a, a, np.full(4, 0.5)), rotation[:, :, a])

@@ -20,6 +20,7 @@ from tetflora_addon.geodata.canopy import checked_canopy, heights_above, without
 from tetflora_addon.geodata.geotiff import place_of_image
 from tetflora_addon.geodata.grids import mosaic, read_grid
 from tetflora_addon.geodata.inventories import read_inventory
+from tetflora_addon.geodata.layers import read_features
 from tetflora_addon.geodata.outlines import BUILDING, MEADOW, OTHER, ROAD, WATER, WOOD, read_outlines
 from tetflora_addon.geodata.projection import PLAIN, System, between
 from tetflora_addon.geodata.rasters import Raster, in_degrees
@@ -288,3 +289,44 @@ def test_kinds_by_the_keys_of_others(tmp_path, geometry, tags, expected):
     assert (found.kind, pytest.approx(found.width or found.height)) == (expected[0], expected[1])
     (found,) = read_outlines(path, kind=WATER)[0]
     assert found.kind == WATER
+
+
+def _record(kind: int, body: bytes) -> bytes:
+    body = struct.pack("<i", kind) + body
+    return struct.pack(">2i", 1, len(body) // 2) + body
+
+
+@pytest.mark.parametrize(
+    ("kind", "body", "expected"),
+    [
+        (1, struct.pack("<2d", 3.0, 4.0), [[3.0, 4.0]]),
+        (11, struct.pack("<4d", 3.0, 4.0, 9.0, 0.0), [[3.0, 4.0]]),  # with a height and a measure
+        (8, struct.pack("<4di4d", 0, 0, 5, 6, 2, 3.0, 4.0, 5.0, 6.0), [[3.0, 4.0], [5.0, 6.0]]),
+    ],
+)
+def test_points_of_shapefiles_are_read(tmp_path, kind, body, expected):
+    path = tmp_path / "points.shp"
+    head, record = files.shapefile([[[0, 0], [0, 1], [1, 1], [0, 0]]])[:100], _record(kind, body)
+    path.write_bytes(head[:24] + struct.pack(">i", 50 + len(record) // 2) + head[28:] + record)
+    (found,), _ = read_features(path, PLAIN)
+    coordinates = found["geometry"]["coordinates"]
+    assert (coordinates if isinstance(coordinates[0], list) else [coordinates]) == expected
+
+
+def _line(order: str, *points: tuple[float, ...], code: int = 2) -> bytes:
+    one = struct.pack(f"{order}BII", order == "<", code, len(points))
+    return one + b"".join(struct.pack(f"{order}{len(p)}d", *p) for p in points)
+
+
+def test_lines_and_collections_of_a_geopackage_are_read(tmp_path):
+    """In either byte order, with heights, and one within the other."""
+    line, high = _line("<", (0.0, 1.0), (2.0, 3.0)), _line(">", (0.0, 1.0, 9.0), (2.0, 3.0, 9.0), code=1002)
+    many = struct.pack("<BII", 1, 5, 2) + line + line
+    all_ = struct.pack("<BII", 1, 7, 2) + many + struct.pack("<BI2d", 1, 1, 7.0, 8.0)
+    path = tmp_path / "lines.gpkg"
+    path.write_bytes(files.geopackage("lines", *((shape, {"art": "x"}) for shape in (line, high, many, all_))))
+    plain = [[0.0, 1.0], [2.0, 3.0]]
+    kinds = [(one["geometry"]["type"], one["geometry"].get("coordinates")) for one in read_features(path, PLAIN)[0]]
+    assert kinds[:3] == [("LineString", plain), ("LineString", plain), ("MultiLineString", [plain, plain])]
+    parts = read_features(path, PLAIN)[0][3]["geometry"]["geometries"]
+    assert [part["type"] for part in parts] == ["MultiLineString", "Point"]

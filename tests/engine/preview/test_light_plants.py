@@ -12,6 +12,7 @@ import pytest
 from tests.engine import support
 from tetflora_addon.compiled.flora import compile_species
 from tetflora_addon.growth.seasons import Season
+from tetflora_addon.growth.seeds import crown_shapes
 from tetflora_addon.preview import light_plants
 from tetflora_addon.species.catalog import load_species
 from tetflora_addon.species.species import Range
@@ -20,12 +21,15 @@ from tetflora_addon.species.species import Range
 KINDS = ("birch", 0.0), ("bush", 40.0)
 
 
-def test_points_have_the_form_and_color_of_the_crowns_with_faces() -> None:
+@pytest.mark.parametrize("formed", [False, True])
+def test_points_have_the_form_and_color_of_the_crowns_with_faces(formed: bool) -> None:
     """As high and as wide in the same places; those with faces are those that look largest from where one stands."""
     flora, rng = support.flora(), np.random.default_rng(5)
     species = rng.permutation(np.repeat([support.SPECIES.index("birch"), support.SPECIES.index("bush")], 20))
     seeds = support.plants(np.arange(40), 0, rng.uniform(-30.0, 30.0, (40, 3)), rng.uniform(0.5, 1.0, 40))
     seeds = replace(seeds, species=species.astype(np.int32))
+    if formed:
+        seeds = replace(seeds, crown=crown_shapes(40, rng.uniform(0.5, 1.5, 40), rng.uniform(0.0, 0.6, 40)))
     expected, points = light_plants.light_plants(flora, seeds), light_plants.light_plants(flora, seeds, most=10)
     eye, forms = np.array([30.0, 0.0, 5.0]), points.crowns.forms
     angle = forms[:, 1] / np.linalg.norm(seeds.position - eye, axis=1)

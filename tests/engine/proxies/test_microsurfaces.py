@@ -12,12 +12,14 @@ from hypothesis import strategies as st
 from tests.engine import support
 from tests.engine.subplants.test_leaf_meshes import check_topology
 from tetflora_addon.buffers import MeshBuffers
-from tetflora_addon.compiled.flora import Flora
+from tetflora_addon.compiled.flora import Flora, compile_species
 from tetflora_addon.growth.growth import trunks
+from tetflora_addon.growth.seasons import Season
 from tetflora_addon.growth.seeds import Branches
 from tetflora_addon.optics import GLOSS
 from tetflora_addon.proxies.microsurfaces import CIRCUMRADIUS, STRETCH, FacetRules, subplant_facets
 from tetflora_addon.refinement.contents import subplant_totals
+from tetflora_addon.species.catalog import load_species
 
 
 def facets(flora: Flora, subplants: Branches, side: float) -> MeshBuffers:
@@ -153,3 +155,32 @@ def test_a_fraction_of_the_area_is_that_and_darkens_as_a_cluster_does() -> None:
     mirrored = [GLOSS * (1.0 - f.dull[leafy])[:, None] for f in (whole, part_of)]
     one, many = ((1 - g) * f.color[leafy] + g for f, g in zip((whole, part_of), mirrored, strict=True))
     np.testing.assert_allclose(many, one * 0.5 / (1 - 0.5 * one))
+
+
+@pytest.mark.parametrize(
+    ("name", "day"), [("cherry_blossom", 105.0), ("cherry_blossom", 120.0), ("cherry_blossom", 200.0), ("rowan", 300.0)]
+)
+def test_leaves_blossoms_and_fruit_have_the_facets_that_a_day_leaves_of_each(name: str, day: float) -> None:
+    """Where a day leaves little of what most samples are on, the few others had facets of 56 times the area."""
+    flora, side = support.alone(name).in_year(Season(day)), 0.1
+    plants = trunks(flora.rows, support.plants(np.arange(80)))
+    made = subplant_facets(flora, plants, FacetRules(np.full(len(plants), side)))
+    made = made.take((made.transmission > 0.0) & (made.side > 0.0))
+    one = max(np.sqrt(flora.one_leaf_area(plants, kind).max()) for kind in flora.day.kinds.tolist())
+    assert made.side.max() < 1.2 * max(side, one)
+    area, all_ = made.side**2, flora.leaf_areas(plants)
+    assert area.sum() == pytest.approx(all_.sum(), rel=0.02)
+    color = np.average(flora.leaf_colors(plants), axis=0, weights=all_)
+    np.testing.assert_allclose(np.average(made.color, axis=0, weights=area), color, rtol=0.1)
+
+
+def test_wood_and_leaves_of_one_kind_do_not_depend_on_what_else_grows() -> None:
+    """A beech beside a cherry has the facets that it has alone."""
+    named = {name: load_species(name) for name in ("beech", "cherry_blossom")}
+    beech, mixed = (compile_species([named[name] for name in names]) for names in (["beech"], named))
+    found = []
+    for flora in (beech.in_year(Season(105.0)), mixed.in_year(Season(105.0))):
+        plants = trunks(flora.rows, support.plants(np.arange(20), 0))
+        found.append(subplant_facets(flora, plants, FacetRules(np.full(len(plants), 0.3))))
+    for one, other in zip(*(vars(made).values() for made in found), strict=True):
+        assert (one is None and other is None) or np.array_equal(one, other)

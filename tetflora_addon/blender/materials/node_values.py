@@ -70,8 +70,8 @@ MATHS: dict[str, Callable[..., Values]] = {
     'TRUNC': np.trunc,
     'FRACT': _fraction,
     'FRACTION': _fraction,
-    'MODULO': lambda a, b: a - np.trunc(_ratio(a, b)) * b,
-    'FLOORED_MODULO': lambda a, b: a - np.floor(_ratio(a, b)) * b,
+    'MODULO': lambda a, b: np.where(b != 0, a - np.trunc(_ratio(a, b)) * b, 0),
+    'FLOORED_MODULO': lambda a, b: np.where(b != 0, a - np.floor(_ratio(a, b)) * b, 0),
     'WRAP': lambda a, high, low: np.where(high != low, a - (high - low) * np.floor(_ratio(a - low, high - low)), low),
     'SNAP': lambda a, b: np.floor(_ratio(a, b)) * b,
     'PINGPONG': lambda a, b: np.where(b != 0, np.abs(_fraction(_ratio(a - b, 2 * b)) * b * 2 - b), 0),
@@ -365,13 +365,14 @@ class NodeValues:
         vector = self.color(node, "Vector", stack)
         shift, turn, scale = (self.color(node, key, stack) for key in ("Location", "Rotation", "Scale"))
         shift, turn, scale = (values.mean(axis=(1, 2), keepdims=True) for values in (shift, turn, scale))
+        scale = scale if node.vector_type != 'NORMAL' else _ratio(np.ones_like(scale), scale)
         linear = np.array(Euler(turn.ravel().tolist()).to_matrix()) @ np.diag(scale.ravel().astype(np.float64))
         move = shift if node.vector_type in {'POINT', 'TEXTURE'} else np.zeros_like(shift)
         if node.vector_type == 'TEXTURE':
-            linear, vector = np.linalg.pinv(linear), vector - move
-            move = np.zeros_like(shift)
+            linear, vector, move = np.linalg.pinv(linear), vector - move, np.zeros_like(shift)
         self._scale *= float(np.sqrt(abs(np.linalg.det(linear[:2, :2]))))
-        return np.tensordot(linear.astype(np.float32), vector, axes=1) + move
+        made = np.tensordot(linear.astype(np.float32), vector, axes=1) + move
+        return made if node.vector_type != 'NORMAL' else _ratio(made, np.linalg.norm(made, axis=0, keepdims=True))
 
     def _of_mix(self, node, socket, stack) -> Values:
         kind = node.data_type
@@ -454,10 +455,9 @@ class NodeValues:
     def _of_curve_rgb(self, node, _socket, stack) -> Values:
         mapping = node.mapping
         mapping.initialize()
-        single = node.type == 'CURVE_FLOAT'
         # The last curve of colors is for all of them, and comes first.
         curves = list(mapping.curves)
-        if single:
+        if node.type == 'CURVE_FLOAT':
             table = self._table(mapping, lambda x: [mapping.evaluate(curves[0], x)])
             value, factor = self.number(node, "Value", stack), self.number(node, "Factor", stack)
             return value + factor * (_looked_up(table, value)[0] - value)
@@ -493,6 +493,7 @@ class NodeValues:
     def _of_clamp(self, node, _socket, stack) -> Values:
         value, low, high = (self.number(node, key, stack) for key in ("Value", "Min", "Max"))
         self._points.uneven = True
+        low, high = (low, high) if node.clamp_type == 'MINMAX' else (np.minimum(low, high), np.maximum(low, high))
         return np.minimum(np.maximum(value, low), high)
 
     def _of_rgbtobw(self, node, _socket, stack) -> Values:
