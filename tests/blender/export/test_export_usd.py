@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from devtools import session
-from tests.blender.scenes import add_plant, datablocks, depsgraph
+from tests.blender.scenes import add_mesh, add_plant, datablocks, depsgraph, select
 from tests.limits import full_disk
 from tetflora_addon.blender import compat
 from tetflora_addon.blender.attributes import image_pixels, linear_rgb, members, values_of
@@ -284,3 +284,34 @@ def test_the_operators_write_and_read(blender, tmp_path, pxr):
     assert bpy.ops.tetflora.import_inventory(filepath=str(tmp_path / "forest.usdc")) == {'FINISHED'}
     assert sorted_bytes(plants()) == before
     assert [layer.field.name for layer in scene().tetflora.layers] == ["Wiesengrund \u68ee"]
+
+
+def test_trees_of_a_stand_come_back_in_the_year_that_was_shown(blender, tmp_path, pxr):
+    """Of a history only one year goes into the file: as plants with their sizes, for the rest of it is no plant's."""
+    ground = add_mesh("ground", size=9.0)
+    select(ground)
+    group = scene().tetflora.stand
+    group.years, group.interval, group.density = 12, 4, 2500.0
+    for name in ("birch", "spruce"):
+        group.species.add().species = name
+    assert bpy.ops.tetflora.grow_stand() == {'FINISHED'}
+    bpy.context.active_object.tetflora.stand_year = 8.0
+    before = plants()
+    export(tmp_path / "stand.usdc")
+    imported(tmp_path / "stand.usdc")
+    after = plants()
+    assert len(after) == len(before) > 10
+
+    def ordered(seeds):
+        kind = np.array([seeds.identifiers[n] for n in seeds.species])
+        order = np.lexsort(seeds.position.round(4).T)
+        return kind[order].tolist(), seeds.take(order)
+
+    (kinds, one), (others, other) = ordered(before), ordered(after)
+    assert kinds == others
+    for name, close in (("position", 1e-4), ("scale", 1e-3), ("frame", 1e-5)):
+        np.testing.assert_allclose(getattr(other, name), getattr(one, name), atol=close)
+    np.testing.assert_array_equal(other.seed, one.seed)
+    assert (one.crown is None) == (other.crown is None)
+    if one.crown is not None:
+        np.testing.assert_allclose(other.crown, one.crown, atol=2e-3)

@@ -19,6 +19,7 @@ from tetflora_addon.blender import compat, worker
 from tetflora_addon.blender.attributes import read
 from tetflora_addon.blender.job import contents, refine
 from tetflora_addon.blender.results.collection import has_results
+from tetflora_addon.blender.species.edits import species_data, store_species
 
 pytestmark = pytest.mark.usefixtures("clean_file")
 
@@ -321,3 +322,33 @@ def test_materials_show_the_colors_of_their_species_in_solid_viewports():
     material.diffuse_color = (0.0, 0.0, 1.0, 1.0)
     _refine(scene)
     assert tuple(material.diffuse_color) == (0.0, 0.0, 1.0, 1.0)
+
+
+def test_leaves_of_a_species_are_the_object_that_its_file_names():
+    """With its texture coordinates and materials; where the file has no such object it is told, and nothing made."""
+    scene = _forest(1)
+    page = species_data(scene, scene.objects["tree 0"].tetflora.species)
+    store_species(scene, "own", {**page, "name": "Own", "leaf": {"object": "my leaf"}})
+    scene.objects["tree 0"].tetflora.species = "own"
+    before = datablocks()
+    with pytest.raises(errors.SpeciesError, match=r'"Own" uses the object "my leaf" as its leaf.*no such object'):
+        _refine(scene, expand_everything=True)
+    assert datablocks() == before
+    leaf = add_mesh("my leaf", faces=[(0, 1, 2), (0, 2, 3)], size=0.5)
+    for name in ("upper", "lower"):
+        leaf.data.materials.append(bpy.data.materials.new(name))
+    leaf.data.polygons[1].material_index = 1
+    corners = np.float32([(0, 0), (1, 0), (1, 1), (0, 0), (1, 1), (0, 1)])
+    leaf.data.uv_layers.new(name="own map").uv.foreach_set("vector", corners.ravel())
+    leaf.hide_render = leaf.hide_viewport = True
+    _refine(scene)
+    (made,) = [o for o in _made(scene) if o["tetflora_kind"] == "leaf"]
+    uv = np.zeros(2 * len(made.data.loops), np.float32)
+    made.data.uv_layers["UVMap"].uv.foreach_get("vector", uv)
+    np.testing.assert_allclose(uv.reshape(-1, 6, 2), np.tile(corners, (len(uv) // 12, 1, 1)))
+    slots = np.zeros(len(made.data.polygons), np.int32)
+    made.data.polygons.foreach_get("material_index", slots)
+    assert slots.tolist() == [0, 1] * (len(slots) // 2)
+    assert [slot.material.name for slot in made.material_slots] == ["upper", "lower"]
+    areas = np.array([polygon.area for polygon in made.data.polygons]).reshape(-1, 2)
+    np.testing.assert_allclose(areas[:, 0], areas[:, 1], rtol=1e-3)

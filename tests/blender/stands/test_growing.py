@@ -179,3 +179,25 @@ def test_leaving_early_changes_nothing():
         next(steps)
     steps.close()
     assert (len(bpy.data.objects), len(bpy.data.meshes)) == before
+
+
+def test_stands_grow_within_areas_and_beside_paths():
+    """By cells of a meter: what is left of a cell at their border counts in full."""
+    scene, ground = bpy.context.scene, add_mesh("ground", size=15.0)
+    held = {}
+    for name, points in (("areas", [(-15, -15), (3, -15), (3, 15), (-15, 15)]), ("paths", [(-6, -20), (-6, 20)])):
+        curve = bpy.data.curves.new(name, 'CURVE')
+        curve.dimensions = '3D'
+        spline = curve.splines.new('POLY')
+        spline.points.add(len(points) - 1)
+        spline.points.foreach_set("co", np.ravel([(*point, 0, 1) for point in points]))
+        spline.use_cyclic_u, curve.bevel_depth = name == "areas", 2.0 * (name == "paths")
+        held[name] = bpy.data.collections.new(name)
+        held[name].objects.link(bpy.data.objects.new(name, curve))
+        scene.collection.children.link(held[name])
+    field = stand_on(ground, density=6000.0, **held)
+    x = plants_of(field, 12.0)[0].position[:, 0]
+    assert len(x) > 40
+    assert x.max() < 4.1 and x.min() < -9.0
+    assert np.abs(x + 6.0).min() > 0.9
+    assert ((x > -4.0) & (x < 3.0)).mean() > 0.3
