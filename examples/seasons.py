@@ -100,19 +100,12 @@ _LONE = (
     ("birch", 3, (-13.5, 1.5), 0.95, 0.0),
     ("birch", 8, (-17.0, 5.0), 1.05, 0.0),
     ("birch", 12, (-12.0, 8.5), 0.8, 0.0),
-    ("cherry", 5, (-3.5, 15.0), 1.2, 0.0),
+    ("cherry_blossom", 5, (-3.5, 15.0), 1.2, 0.0),
     ("maple", 4, (27.0, 22.0), 0.9, 0.0),
     ("spruce", 2, (-25.0, 22.0), 0.9, 0.0),
     ("spruce", 6, (-29.0, 27.0), 0.7, 0.0),
     ("larch", 7, (-34.0, 30.0), 0.85, 0.0),
 )
-_CHERRY_LEAVES = {
-    "leaves": [9, 2],
-    "leaf_size": [0.1, 0.02],
-    "leaf_start": 0.15,
-    "leaf_color": [[0.07, 0.115, 0.025], [0.015, 0.02, 0.006]],
-    "leaf_color_tip": [0.085, 0.135, 0.03],
-}
 _WOOD, _MARGIN = "wood", "edge"
 #: How much trees of the hill have grown as between others.
 _HABIT = 0.35
@@ -132,7 +125,6 @@ def wooded(x: NDArray[np.float64], y: NDArray[np.float64]) -> NDArray[np.float64
 
 def build(scene: bpy.types.Scene) -> None:
     """Fill an empty scene with land, trees and what covers the ground; `dress` gives it a season."""
-    _add_cherry(scene)
     for species, seed, (x, y), scale, age in _LONE:
         stage.plant(scene, species, seed, (x, y, float(height(np.float64(x), np.float64(y)))), 2.4 * seed, scale, age)
     masks = {_WOOD: lambda x, y: np.clip(wooded(x, y) / 4.0, 0.0, 1.0)}
@@ -155,16 +147,6 @@ def dress(scene: bpy.types.Scene, look: Look) -> None:
     stage.sun(scene, look.sun[0], look.sun[1] - 180.0, look.energy, look.tint, 0.8)
     scene.world = sky(look)
     add_haze(scene, *look.haze, land="Far")
-
-
-def _add_cherry(scene: bpy.types.Scene) -> None:
-    """Give the file a cherry with the leaves of summer: those of the catalog's are as few as when it blossoms."""
-    from tetflora_addon.blender.species.edits import species_data, store_species
-
-    page = species_data(scene, "cherry_blossom")
-    orders = [{**one, **_CHERRY_LEAVES} if one.get("leaves", [0])[0] > 0 else one for one in page["orders"]]
-    year = {**page["year"], "leaf": {**page["year"]["leaf"], "fresh": [0.16, 0.15, 0.04]}}
-    store_species(scene, "cherry", {**page, "name": "Cherry", "orders": orders, "year": year})
 
 
 def sky(look: Look) -> bpy.types.World:

@@ -13,6 +13,9 @@ import pytest
 
 from devtools import leaf_area
 from tests.engine import support
+from tetflora_addon.compiled.flora import compile_species
+from tetflora_addon.compiled.sizes import crown_of
+from tetflora_addon.growth.growth import trunks
 from tetflora_addon.growth.hashing import key_of_seed
 from tetflora_addon.growth.rows import build_rows
 from tetflora_addon.growth.seasons import (
@@ -184,3 +187,15 @@ def test_blossoms_and_fruit_have_their_season(name: str, there: float, gone: flo
 def test_a_cherry_blooms_before_its_leaves() -> None:
     year = load_species("cherry_blossom").year
     assert leaf_area.leaf_area(year, year.leaf, np.array([year.blossom.appear + 5.0]))[0] < 0.15
+
+
+def test_trees_with_blossoms_have_leaves_in_summer() -> None:
+    """Leaves of a cherry that is described in blossom were a fiftieth of all: it was bare for the rest of the year."""
+    for name in ("cherry_blossom", "rowan", "hazel", "mango", "spruce"):
+        flora = compile_species([load_species(name)])
+        described, summer = (
+            one.leaf_areas(trunks(one.rows, support.plants(np.arange(10)))).mean()
+            for one in (flora, flora.in_year(Season(200.0)))
+        )
+        assert summer > 0.5 * np.pi * crown_of(load_species(name)).radius ** 2, name
+        assert summer > 0.1 * described, name
