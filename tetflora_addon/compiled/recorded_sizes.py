@@ -141,7 +141,7 @@ def sized(
         if not len(own):
             continue
         with suppress(SpeciesError):
-            if (species := find(Kind.read(kind).species)) is None:
+            if (species := find(kind)) is None:
                 continue
             if Kind.read(kind).skeleton:  # it is as it was drawn
                 scale[own] *= measure_of(species).fitted(seeds.take(own), sizes.take(own))[0]

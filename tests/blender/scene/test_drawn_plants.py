@@ -8,6 +8,7 @@ import bpy
 import numpy as np
 import pytest
 
+from tests.blender.scene.test_field_sizes import field_of
 from tests.blender.scenes import add_camera, add_plant, depsgraph
 from tetflora_addon import errors
 from tetflora_addon.blender.job import plant_mesh, refine
@@ -79,3 +80,17 @@ def test_a_form_without_edges_is_named():
     add_plant("tree", "bush", 3).tetflora.skeleton = empty
     with pytest.raises(errors.SpeciesError, match="nothing drawn"):
         refine.refine(bpy.context.scene, depsgraph())
+
+
+def test_drawn_plants_of_a_field_are_as_high_as_is_recorded():
+    """They were as many times as high as their species would have to be that is drawn nowhere."""
+    scene = bpy.context.scene
+    add_camera()
+    obj = field_of(2, kinds=("bush",), places=[[0, 5, 0], [40, 5, 0]], tf_height=('FLOAT', [8.0, 2.0]))
+    obj.tetflora.field_species[0].skeleton = _form()
+    np.testing.assert_allclose(plants.read_plants(scene, depsgraph())[0].scale, [2.0, 0.5], rtol=0.02)
+    scene.tetflora.expand_everything = True
+    refine.refine(scene, depsgraph())
+    points = np.concatenate([_positions(o) for o in scene.objects if o.get("tetflora_kind") == "bark"])
+    for own, height in ((points[:, 0] < 20.0, 8.0), (points[:, 0] > 20.0, 2.0)):
+        assert points[own, 2].max() == pytest.approx(height, rel=0.03)

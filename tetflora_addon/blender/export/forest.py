@@ -255,7 +255,7 @@ def export_steps(data: JobData, order: ExportOrder) -> Job[Exported]:
     with written_whole(order.path) as folder:
         yield Progress(0.0, "reading plants")
         sources = read_sources(data.scene, data.depsgraph)
-        seeds = merged([seeds for _, seeds in classed(data.scene, [source.part for source in sources])])
+        seeds = merged([seeds for _, seeds in classed(data.scene, [one.part for one in sources], data.depsgraph)])
         kinds = yield from part_of(kinds_of(data, seeds, order.variants), 0.05, 0.15)
         left = memory_left(data.scene)
         shown = yield from part_of(variants_of(seeds, kinds, order.levels, order.polygons, left), 0.15, 0.65)

@@ -55,7 +55,7 @@ def canopy_steps(progress: Progress, scene: bpy.types.Scene, depsgraph: bpy.type
     scale = np.cbrt(np.abs(np.linalg.det(places[:, :3, :3])))
     parts = [(places[:, :3, 3], scale, None, *crown_kinds(scene, names, index, stored_ages(single)))]
     fields = [read_aged_field(o, depsgraph, world_matrix(o, depsgraph)[None]) for o in fields_of(objects)]
-    find = finder(scene, (kind for seeds, *_ in fields for kind in seeds.identifiers))
+    find = finder(scene, (kind for seeds, *_ in fields for kind in seeds.identifiers), depsgraph)
     for read, ages in (yield from call_in_thread(progress, lambda: [sized(*one, find) for one in fields])):
         parts.append((read.position, read.scale, read.crown, *crown_kinds(scene, read.identifiers, read.species, ages)))
     yield from crown_steps(progress, scene, {kind for _, _, _, kinds, *_ in parts for kind in kinds})

@@ -262,7 +262,8 @@ def plants_from_field(
     SceneError
         The field has no points, too many, or cannot be read; nothing is changed.
     """
-    read, ages = plainly_aged(scene, *fields.read_aged_field(field, depsgraph, world_matrix(field, depsgraph)[None]))
+    given = fields.read_aged_field(field, depsgraph, world_matrix(field, depsgraph)[None])
+    read, ages = plainly_aged(scene, *given, depsgraph)
     if not 0 < len(read) <= most:
         raise SceneError(
             f'"{field.name}" has {len(read):,} plants; '

@@ -20,7 +20,7 @@ from ...species.species import LEAF_KINDS, Species
 from ..attributes import mesh_of
 from ..materials.materials import bark_material, leaf_material
 from ..materials.nodes import is_ours
-from ..scene.skeletons import read_skeleton, skeleton_object_of
+from ..scene.ages import drawn_species
 from ..species.edits import species_for
 from .meshes import read_mesh
 from .output import replaced_material
@@ -163,12 +163,8 @@ def resolved_species(scene: bpy.types.Scene, kind_of_plant: str, depsgraph: bpy.
     SpeciesError
         Unknown or broken species, an object that is missing or not a mesh with faces, or a form without edges.
     """
-    identifier, form = species_of(kind_of_plant), skeleton_object_of(kind_of_plant)
-    species = species_for(scene, identifier)
-    if form is not None:
-        species = replace(species, skeleton=read_skeleton(form, depsgraph))
-    chosen = leaf_objects(scene).get(identifier)
-    if chosen is not None:
+    species = drawn_species(scene, kind_of_plant, depsgraph)
+    if (chosen := leaf_objects(scene).get(species_of(kind_of_plant))) is not None:
         species = replace(species, leaf=(_model_of(species, chosen, depsgraph, "leaf"),))
     for kind in LEAF_KINDS:
         forms = getattr(species, kind)

@@ -12,10 +12,11 @@ before. The years that pass in a scene are added afterward and change no class.
 from collections.abc import Callable, Iterable, Sequence
 from contextlib import suppress
 from dataclasses import replace
+from functools import partial
 
-import bpy
 import numpy as np
 from bpy.app.translations import pgettext_iface as iface
+from bpy.types import Depsgraph, Scene
 from numpy.typing import NDArray
 
 from ...arrays import Floats, Integers, Integers32
@@ -27,6 +28,7 @@ from ...species.kinds import Kind, species_of
 from ...species.species import Species
 from ..settings import years_of
 from ..species.edits import species_for
+from .skeletons import read_skeleton, skeleton_object_of
 
 #: Classes of a species at most, and years from its death to the last of them.
 MOST, _FALLEN = 12, 40.0
@@ -35,7 +37,7 @@ Part = tuple[str, Seeds, Floats | None, Sizes | None]
 """The name of an object, its plants, their ages, None where all are full-grown, and recorded sizes if there are any."""
 
 
-def stage_text(scene: bpy.types.Scene, identifier: str, age: float) -> str:
+def stage_text(scene: Scene, identifier: str, age: float) -> str:
     """The stage of life that plants of a species are in at an age and the scene's years, for panels; empty for none."""
     try:
         species, years = species_for(scene, identifier), age + years_of(scene)
@@ -45,9 +47,10 @@ def stage_text(scene: bpy.types.Scene, identifier: str, age: float) -> str:
     return iface(found)
 
 
-def classed(scene: bpy.types.Scene, parts: Sequence[Part]) -> list[tuple[str, Seeds]]:
-    """Plants whose kinds name the ages that their species is to be compiled for."""
-    found = [(name, *with_sizes(scene, seeds, ages, sizes)) for name, seeds, ages, sizes in parts]
+def classed(scene: Scene, parts: Sequence[Part], depsgraph: Depsgraph | None = None) -> list[tuple[str, Seeds]]:
+    """Plants whose kinds name the ages that their species is to be compiled for; recorded sizes need a depsgraph."""
+    find = partial(drawn_species, scene, depsgraph=depsgraph)
+    found = [(name, *sized(*of_plants, find)) for name, *of_plants in parts]
     if all(ages is None for _, _, ages in found):
         return [(name, seeds) for name, seeds, _ in found]
     different: dict[str, set[float]] = {}
@@ -59,19 +62,18 @@ def classed(scene: bpy.types.Scene, parts: Sequence[Part]) -> list[tuple[str, Se
     return [(name, seeds if ages is None else _classed(scene, seeds, ages, many)) for name, seeds, ages in found]
 
 
-def with_sizes(
-    scene: bpy.types.Scene, seeds: Seeds, ages: Floats | None, sizes: Sizes | None
-) -> tuple[Seeds, Floats | None]:
-    """Plants (n,) in their recorded sizes, if there are any, and the ages of all others."""
-    return sized(seeds, ages, sizes, lambda identifier: species_for(scene, identifier))
+def drawn_species(scene: Scene, kind: str, depsgraph: Depsgraph) -> Species:
+    """The species of a kind of plant, with the skeleton that an object draws if the kind has one."""
+    species, form = species_for(scene, species_of(kind)), skeleton_object_of(kind)
+    return species if form is None else replace(species, skeleton=read_skeleton(form, depsgraph))
 
 
-def finder(scene: bpy.types.Scene, kinds: Iterable[str]) -> Callable[[str], Species | None]:
+def finder(scene: Scene, kinds: Iterable[str], depsgraph: Depsgraph) -> Callable[[str], Species | None]:
     """What finds the species of some kinds without Blender."""
     known: dict[str, Species] = {}
-    for identifier in set(map(species_of, kinds)):
+    for kind in set(kinds):
         with suppress(SpeciesError):
-            known[identifier] = species_for(scene, identifier)
+            known[kind] = drawn_species(scene, kind, depsgraph)
     return known.get
 
 
@@ -85,13 +87,13 @@ def class_ages(species: Species, years: Floats) -> Floats:
 
 
 def plainly_aged(
-    scene: bpy.types.Scene, seeds: Seeds, ages: Floats | None, sizes: Sizes | None
+    scene: Scene, seeds: Seeds, ages: Floats | None, sizes: Sizes | None, depsgraph: Depsgraph | None = None
 ) -> tuple[Seeds, Floats | None]:
-    """As `with_sizes`, with all ages (n,) beside kinds that name none; what died young is old and small.
+    """As `sized`, with all ages (n,) beside kinds that name none; what died young is old and small.
 
     Those of a dense stand are free ones with narrow crowns.
     """
-    seeds, ages = with_sizes(scene, seeds, ages, sizes)
+    seeds, ages = sized(seeds, ages, sizes, partial(drawn_species, scene, depsgraph=depsgraph))
     kinds = [Kind.read(kind) for kind in seeds.identifiers]
     if not any(kind.age for kind in kinds):
         return seeds, ages
@@ -127,7 +129,7 @@ def kind_species(species: Species, kind: str, years: float = 0.0) -> Species:
     return at_age(species, one.age, one.dead, one.crowded)
 
 
-def _classed(scene: bpy.types.Scene, seeds: Seeds, ages: Floats, many: set[str]) -> Seeds:
+def _classed(scene: Scene, seeds: Seeds, ages: Floats, many: set[str]) -> Seeds:
     years, which = years_of(scene), [n for n, kind in enumerate(seeds.identifiers) if species_of(kind) in many]
     classes, taller = _in_classes(scene, seeds.identifiers, seeds.species, ages, years, which)
     kinds, number = _by_age(seeds.identifiers, seeds.species, classes)
@@ -135,7 +137,7 @@ def _classed(scene: bpy.types.Scene, seeds: Seeds, ages: Floats, many: set[str])
 
 
 def crown_kinds(
-    scene: bpy.types.Scene, kinds: Sequence[str], number: Integers, ages: Floats | None
+    scene: Scene, kinds: Sequence[str], number: Integers, ages: Floats | None
 ) -> tuple[tuple[str, ...], Integers32, Floats]:
     """Kinds of plants of which crowns are known well enough, for plants (n,) of some kinds and their ages.
 
@@ -172,7 +174,7 @@ def _by_age(kinds: Sequence[str], number: Integers, ages: Floats) -> tuple[tuple
 
 
 def _in_classes(
-    scene: bpy.types.Scene, kinds: Sequence[str], number: Integers, ages: Floats, years: float, which: Iterable[int]
+    scene: Scene, kinds: Sequence[str], number: Integers, ages: Floats, years: float, which: Iterable[int]
 ) -> tuple[Floats, Floats]:
     """Ages of classes (n,) for plants (n,) of some of the kinds, and their heights over those (n,) in so many years.
 

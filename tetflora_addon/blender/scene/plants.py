@@ -167,7 +167,7 @@ def _read_plants(
         raise found.nothing(scene)
     owners = [(source.part[0], len(source.part[1])) for source in read]
     owners[: len(found.single)] = [(obj.name, 1) for some in found.single.values() for obj in some]
-    aged = classed(scene, [source.part for source in read])
+    aged = classed(scene, [source.part for source in read], depsgraph)
     seen = [
         replace(seeds, identifiers=tuple(str(replace(Kind.read(kind), look=source.look)) for kind in seeds.identifiers))
         for source, (_, seeds) in zip(read, aged, strict=True)
