@@ -24,6 +24,8 @@ from .paper.pictures import save_jpeg
 SIZE, SAMPLES, INSTANCES = (800, 360), 20, 10_000
 #: Rows of white between the two pictures.
 _GAP = 6
+#: Stops: the eye stands in the shade of the crowns.
+_EXPOSURE = 1.0
 
 
 def render_pair(path: Path, size: tuple[int, int] = SIZE, samples: int = SAMPLES, instances: int = INSTANCES) -> None:
@@ -34,6 +36,7 @@ def render_pair(path: Path, size: tuple[int, int] = SIZE, samples: int = SAMPLES
 
     scene = bpy.context.scene
     instancer = assets.build(scene, assets.Scatter("leaves", instances, "near", size=size))
+    scene.view_settings.exposure = _EXPOSURE
     both = Image.new("RGB", (size[0], 2 * size[1] + _GAP), "white")
     with tempfile.TemporaryDirectory() as folder:
         picture = Path(folder) / "picture.png"

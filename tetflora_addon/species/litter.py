@@ -141,7 +141,7 @@ def log_page(species: Species, page: Mapping[str, Any]) -> dict[str, Any] | None
     log = parts["log"] | {
         "length": _pair(length / _BURIED, 0.3 * length / _BURIED),
         "thickness": _pair(radius / _BURIED, 0),
-        "leaf_size": _pair(2.04 * 0.8 * radius, 0),
+        "leaf_size": _pair(2.04 * parts["log"]["taper"] * radius, 0),
     }
     # The stem leads down, so that the log begins in the ground and comes out of it on its way.
     orders = [parts["stem"], log, parts["stub"]]

@@ -148,7 +148,7 @@ class Plants(Arrays):
         """What they are now; ``plant`` is their number still."""
         diameter, offset = traits.diameters(self.species, self.basal), np.stack([self.east, self.north], axis=1)
         identity = self.number, np.full(len(self), year), self.species, uniform(self.key, StandDraw.SEED) * 2.0**31
-        crown = diameter, 2.0 * self.radius, self.base, offset
+        crown = diameter, np.maximum(2.0 * self.radius, _SLIM[0] * np.minimum(self.height, _SLIM[1])), self.base, offset
         upright = np.zeros((len(self), 2)), np.zeros(len(self))
         place = np.stack([site.west + self.x, site.south + self.y, site.ground(self.x, self.y)], axis=1)
         return Records.typed(*identity, place.astype(np.float32), self.height, *crown, *upright)
@@ -196,8 +196,7 @@ def keys_of(seed: int, what: int) -> Keys:
 
 #: Height for the basal diameter over that in a closed stand: where light beside the crown is full, and where is none.
 _SLENDER_LIT, _SLENDER_DARK = 0.72, 1.14
-#: Light beside a crown in which it begins to widen, for shade tolerance 0 and 5 (crowns of tolerant trees reach into
-#: each other); how much more lets it widen as fast as it can.
+#: Light beside a crown in which it begins to widen, for shade tolerance 0 and 5; how much more for its fastest.
 _SIDE, _SIDE_MORE = (0.61, 0.26), 0.35
 #: Where that is: in lengths of a dome and of a cone below the top, and so much of the height at most counts as length.
 _BESIDE, _LONG = (0.65, 0.85), 0.45
@@ -205,10 +204,11 @@ _BESIDE, _LONG = (0.65, 0.85), 0.45
 _DARK = 1.5
 #: Fractions of the radius, or of what is lacking, by which a crown narrows and widens in a year.
 _NARROWS, _WIDENS = 0.05, 0.12
+#: Width of a crown as recorded, over the height, at least: shaded saplings are no bare rods; and up to which height.
+_SLIM = 0.3, 3.0
 #: Fraction of the crown that dies from below in a year where it is quite dark; shortest crown, over the height.
 _RISES, _SHORTEST = 0.3, 0.12
-#: Offset for the difference of light on two sides over its sum where that is small, over the most; the most of it; and
-#: what of it comes in a year.
+#: Offset for a small difference of light on two sides over its sum, over the most; the most; what comes in a year.
 _LEANS, _MOST_OFFSET, _TURNS = 6.0, 0.6, 0.08
 #: Light over that of a free plant in which plants grow about half as fast as they can at all.
 _HALF_LIT = 0.1
@@ -220,10 +220,9 @@ _RECENT = 0.3
 _WEAK, _DIES = (0.2, 0.025), 0.15
 #: Chance to die for other reasons: of so many in a lifespan, for each that is left; when the old die, in lifespans.
 _OTHERS, _OLD = 1.0, (0.8, 1.15)
-#: Trees that stand dead: least diameter and height, and years until they fall, and are gone, for 40 cm.
+#: Trees that stand dead: least diameter and height; years until they fall, and are gone, for 40 cm; what breaks then.
 _KEPT_DIAMETER, _KEPT_HEIGHT = 0.05, 2.0
-_STANDS, _LIES = (2.0, 22.0), (8.0, 40.0)
-_DEAD_DIAMETER = 0.4
+_STANDS, _LIES, _DEAD_DIAMETER, _BREAKS = (2.0, 22.0), (8.0, 40.0), 0.4, 0.1
 
 
 def grown(
@@ -328,6 +327,7 @@ def fallen(plants: Plants, last: Records, slope: tuple[NDArray, NDArray], cells:
     lasts = np.sqrt(last.diameter.astype(np.float64) / _DEAD_DIAMETER)
     stands = np.floor((_STANDS[0] + (_STANDS[1] - _STANDS[0]) * uniform(plants.key, StandDraw.FALL) ** 2) * lasts) + 1.0
     lies = np.floor((_LIES[0] + (_LIES[1] - _LIES[0]) * uniform(plants.key, StandDraw.LIE)) * lasts) + 1.0
+    lies[last.diameter < _BREAKS] = 0.0
     turn = uniform(plants.key, StandDraw.LEAN)
     # Directions on a square, which needs no sine: rounded to a circle by its own length.
     along = 1.0 - np.abs(((4.0 * turn - 2.0) % 2.0) - 1.0) * 2.0

@@ -20,6 +20,7 @@ from tetflora_addon.growth.seeds import Seeds
 from tetflora_addon.species.catalog import builtin_folder, load_species, species_from_dict
 from tetflora_addon.species.litter import FALLEN, leaves_page, shed_share
 from tetflora_addon.species.members import expected_polygons
+from tetflora_addon.subplants.pieces import expand
 
 TREES = ("beech", "oak", "birch", "spruce", "scots_pine", "willow")
 
@@ -89,6 +90,20 @@ def test_dead_wood_has_no_leaves():
             # The cut end of a log is a disc.
             assert [o.leaf_kind for o in bearing] == (["blossom"] if kind == "log" else [])
             assert _species(name, kind).bark == load_species(name).bark
+
+
+@pytest.mark.parametrize("name", TREES)
+def test_logs_are_a_little_bent_and_thinner_at_their_ends(name):
+    flora, bent = compile_species([_species(name, "log")]), []
+    for seed in range(8):
+        one = Seeds((name,), np.zeros(1, np.int32), np.array([seed]), np.zeros((1, 3)), np.eye(3)[None], np.ones(1))
+        _, log, *_ = expand(flora, trunks(flora.rows, one))
+        knots = log.lines.knots[0, : log.lines.segments[0] + 1]
+        along = knots[-1] - knots[0]
+        away = np.linalg.norm(np.cross(knots - knots[0], along), axis=1) / np.linalg.norm(along)
+        bent.append(away.max() / np.linalg.norm(along))
+    assert 0.01 < np.mean(bent) < 0.05 and max(bent) < 0.1
+    assert 0.5 < _species(name, "log").orders[1].taper.mean < 0.7
 
 
 def test_what_has_no_leaves_or_is_low_sheds_none():

@@ -150,6 +150,19 @@ def test_the_dead_stay_dead_and_fall_once() -> None:
     assert np.array_equal(rows.height[1:][again & ~alive[1:]], rows.height[:-1][again & ~alive[1:]])
 
 
+def test_thin_dead_trees_break_as_they_fall() -> None:
+    rows = records()
+    assert rows.diameter[rows.lying].min() >= 0.1 > rows.diameter[rows.dead > 0].min()
+
+
+def test_saplings_in_the_shade_have_crowns() -> None:
+    """Of three tenths of their height at least: rods without leaves had been left of some."""
+    last = records().at(60.0)
+    young = last.take(np.flatnonzero((last.dead == 0) & (last.height < 3.0)))
+    assert len(young) > 10
+    assert (young.crown_width >= 0.299 * young.height).all()
+
+
 def test_a_year_between_two_records_lies_between_them() -> None:
     rows = records()
     for year in (0.0, 10.0, 33.0, 60.0):
