@@ -179,7 +179,8 @@ def test_operations_of_vectors_are_those_of_blender():
             assert (found is None) == (kind in left_out), kind
             if found is not None:
                 wanted = _of_blender("ShaderNodeVectorMath", inputs, operation=kind)
-                np.testing.assert_allclose(found, wanted, atol=1e-4, err_msg=f"{kind} {given}")
+                known = np.isfinite(wanted)  # geometry nodes of 4.5 know no remainder of a division by 0
+                np.testing.assert_allclose(found[known], wanted[known], atol=1e-4, err_msg=f"{kind} {given}")
 
 
 @pytest.mark.parametrize("kind", ['MINMAX', 'RANGE'])
