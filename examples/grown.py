@@ -28,6 +28,7 @@ from .wood import land
 
 YEARS = (8, 25, 70, 150)
 SIZE, SAMPLES = (740, 420), 24
+_EXPOSURE = 0.9  # one for all, as the light is
 #: Species and their shares of the seeds that arrive.
 SEEDS = {
     "birch": 5.0,
@@ -37,8 +38,7 @@ SEEDS = {
     "oak": 1.0,
     "ash": 1.0,
     "maple": 1.0,
-    "hornbeam": 1.0,
-    "beech": 2.0,
+    "beech": 3.0,
     "hazel": 1.0,
 }
 #: Sides of the stand and of the land, and how high the land rolls, meters.
@@ -92,7 +92,7 @@ def render_grown(path: Path, size: tuple[int, int] = SIZE, samples: int = SAMPLE
             field.tetflora.stand_year = year
             bpy.context.view_layer.update()
             made.append(Path(folder) / f"{year}.png")
-            render(made[-1], size, samples, 0.45, beyond=0.05)
+            render(made[-1], size, samples, beyond=0.05, exposure=_EXPOSURE)
         names = [f"{year} years" for year in YEARS]
         save_sheet(list(zip(made, names, strict=True)), 2, path)
 
