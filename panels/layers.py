@@ -170,7 +170,7 @@ def TETFLORA_PT_layers(layout: bpy.types.UILayout, context: bpy.types.Context) -
         names = ", ".join(obj.name for obj in there[:2]) + (f" and {len(there) - 2:,} more" if len(there) > 2 else "")
         base.draw_below(body, names or "None", "Ground")
         for name in (entry.object.name for entry in owner.grounds if entry.object not in {None, *there}):
-            base.draw_message(context, body, f'"{name}" is not in the scene: Use Selected Meshes in the menu')
+            base.draw_message(context, body, f'"{name}" is not in the scene; choose Use Selected Meshes in the menu')
         base.draw_where(body, owner)
     if layer.kind == SCATTER and (body := base.section(column, "Spacing and Size")):
         _draw_spacing(body, layer)

@@ -86,7 +86,7 @@ def test_a_ground_that_is_not_in_the_scene_is_told_as_missing_with_what_to_do():
     bpy.ops.tetflora.populate(count=3, species="bush", min_distance=0.1)
     assert "meadow" in labels() and "not in the scene" not in labels()
     bpy.context.scene.collection.objects.unlink(ground)
-    assert '"meadow" is not in the scene: Use Selected Meshes' in labels()
+    assert '"meadow" is not in the scene; choose Use Selected Meshes' in labels()
 
 
 def test_the_wind_says_that_it_is_a_speed():

@@ -324,7 +324,7 @@ def test_a_ground_is_not_looked_at_while_panels_are_drawn(monkeypatch):
     """In a window; what was found last counts."""
     _on_ground('SCATTER')
     monkeypatch.setattr(rules, "ground_form", lambda *_: pytest.fail("looked at a ground"))
-    monkeypatch.setattr(rules.changed_grounds, "of", lambda *_: {(_population().uid, _population().stood_on)})
+    monkeypatch.setattr(rules.changed_grounds, "of", lambda *_: {_population().uid: _population().stood_on})
     assert layers.is_due(_population())
     monkeypatch.setattr(rules.changed_grounds, "of", lambda *_: None)
     assert not layers.is_due(_population())

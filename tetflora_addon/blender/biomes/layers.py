@@ -80,7 +80,7 @@ def is_due(layer: Layer) -> bool:
 
 def due_layers(scene: bpy.types.Scene) -> list[str]:
     """Identities of all layers that an update would change, but biomes, whose layers are among them; reads grounds."""
-    layers, moved = scene.tetflora.layers, dict(run_to_end(rules.changed_steps(scene, bpy.context.view_layer)))
+    layers, moved = scene.tetflora.layers, run_to_end(rules.changed_steps(scene, bpy.context.view_layer))
     return [one.uid for one in layers if one.kind != BIOME and (is_due(one) or (one.uid in moved and not one.frozen))]
 
 

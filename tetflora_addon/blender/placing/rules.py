@@ -215,12 +215,12 @@ def forms_of(grounds: Iterable[bpy.types.Object], form: Callable[[bpy.types.Obje
     return " ".join(forms) if all(forms) else ""
 
 
-def changed_steps(scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer) -> Generator[None, None, set]:
+def changed_steps(scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer) -> Generator[None, None, dict[str, str]]:
     """Layers of which a ground was moved or edited since their plants were placed: identities, and where they stood."""
-    found, form = set(), cache(lambda obj: ground_form(obj, view_layer.depsgraph))
+    found, form = {}, cache(lambda obj: ground_form(obj, view_layer.depsgraph))
     kept = ((one.uid, rules_of(one)) for one in scene.tetflora.layers)
     for uid, before, grounds in [(uid, one.stood_on, grounds_of(scene, one)) for uid, one in kept if one.stood_on]:
-        found |= {(uid, before)} if lies_elsewhere(before, forms_of(grounds, form)) else set()
+        found |= {uid: before} if lies_elsewhere(before, forms_of(grounds, form)) else {}
         yield
     return found
 
@@ -232,7 +232,8 @@ register, unregister = changed_grounds.register, changed_grounds.unregister
 
 def on_changed_ground(layer: bpy.types.PropertyGroup) -> bool:
     """Whether a layer is one of them, as it was found last, and was not grown again since; cheap."""
-    return (layer.uid, rules_of(layer).stood_on) in (changed_grounds.of(layer.id_data, bpy.context.view_layer) or ())
+    found = changed_grounds.of(layer.id_data, bpy.context.view_layer) or {}
+    return found.get(layer.uid) == rules_of(layer).stood_on
 
 
 def free_seed(scene: bpy.types.Scene, seed: int) -> int:
