@@ -171,8 +171,8 @@ def render(ui, name):
 
 
 def running(ui):
-    """Whether Refine or Populate runs as a modal job."""
-    jobs = {"TETFLORA_OT_refine", "TETFLORA_OT_populate"}
+    """Whether Refine, Populate or Update runs as a modal job."""
+    jobs = {"TETFLORA_OT_refine", "TETFLORA_OT_populate", "TETFLORA_OT_update_layers"}
     return any(operator.bl_idname in jobs for operator in ui.window.modal_operators)
 
 

@@ -95,6 +95,8 @@ def lift_the_ground(ui):
     yield from due(True)
     yield from press_button(ui, "tetflora.update_layers")
     yield from due(False)
+    yield from ui.until(lambda: not running(ui), 60, "update")
+    bpy.context.view_layer.update()  # new objects are at the origin until then
     plants = [obj for obj in bpy.context.scene.objects if obj.tetflora.is_plant]
     ui.values["lifted"] = [obj.matrix_world.translation.z for obj in plants]
 
