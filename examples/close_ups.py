@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Close-ups of species as an artist would frame them: leaf, twig, bark, foot, and the crown against the sun.
+"""Close-ups of species as an artist would frame them: leaf, twig, bark, foot, and crown.
 
     python -m examples.close_ups                          # docs/images/close_ups.jpg, eight species
     python -m examples.close_ups --out out/looks oak ash  # one picture for each view of these species
@@ -41,8 +41,8 @@ _AROUND, _SIDE = 14, 50.0
 _TOWARD = np.array([-0.25, -0.86, 0.44]) / np.linalg.norm([0.25, 0.86, 0.44])
 #: Pixels to which shadows of hidden crowns are refined where trunks are seen.
 _SHADOWS = 10.0
-#: Mean of a picture that is well exposed, of its display values.
-_GRAY = 0.34
+#: Mean of a picture that is well exposed, of its display values: of most, and of crowns before the sky.
+_GRAY, _BRIGHT = 0.34, 0.5
 #: Width of a picture on the sheet, pixels.
 _CELL = 276
 #: Strength of the sky: bright haze, which opens the shade under crowns.
@@ -90,7 +90,7 @@ class Subject:
 
     def leaf_view(self) -> None:
         """A leaf that fills a third of the picture."""
-        self._aim(self.leaf, self.leaf + _TOWARD * max(4.6 * self.size, 0.2), 55.0, blur=11.0)
+        self._aim(self.leaf, self.leaf + _TOWARD * max(4.6 * self.size, 0.2), 55.0, blur=18.0)
 
     def twig_view(self) -> None:
         """A twig with its leaves."""
@@ -110,12 +110,10 @@ class Subject:
         self._aim(middle, middle + away + [0.0, 0.0, 0.35 + 2.0 * radius], 45.0)
 
     def crown_view(self) -> None:
-        """The crown against the sun, from below."""
-        angle = np.radians([ELEVATION, AZIMUTH])
-        sun = np.array([np.sin(angle[1]) * np.cos(angle[0]), np.cos(angle[1]) * np.cos(angle[0]), np.sin(angle[0])])
-        target = np.array([0.0, 0.0, 0.5 * (self.crown.base + self.crown.height)])
-        away = (target[2] - 1.6) / sun[2]
-        self._aim(target, target - sun * max(away, 1.0), 30.0)
+        """The crown in the light, from where one stands to look at it."""
+        target = np.array([0.0, 0.0, 0.52 * self.crown.height])
+        away = max(1.05 * self.crown.height, 2.6 * self.crown.radius)
+        self._aim(target, np.array([-0.3 * away, -0.95 * away, 1.6]), 30.0)
 
     @property
     def views(self) -> dict[str, Callable[[], None]]:
@@ -263,7 +261,7 @@ def render_views(
             # Trunks stand in the shade of crowns that the camera does not see.
             scene.tetflora.shadow_cutoff = _SHADOWS if name in ("bark", "foot") else 0.0
             made.append(folder / f"{identifier}-{name}.png")
-            render(made[-1], size, samples)
+            render(made[-1], size, samples, _BRIGHT if name == "crown" else _GRAY)
     return made
 
 

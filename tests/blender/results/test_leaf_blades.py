@@ -75,6 +75,18 @@ def test_the_material_knows_the_length_of_leaves_and_parallel_veins_their_width(
     assert group.inputs["Veins"].default_value * width == pytest.approx(11.0, rel=0.1)
 
 
+def test_veins_are_as_many_as_ends_of_the_margin_or_follow_the_width():
+    """Pairs as floras have them; a blade whose margin has a wave for each vein swells between them, others lie flat."""
+    relief = {}
+    for identifier, pairs in {"beech": (5, 9), "birch": (6, 8), "aspen": (4, 7), "hornbeam": (9, 15)}.items():
+        made = leaf_objects.species_leaf_material(catalog.load_species(identifier), "leaf")
+        group = next(n for n in made.node_tree.nodes if n.type == 'GROUP' and "Leaf Length" in n.inputs)
+        # The first vein leaves the midrib at the base, and the last well before the tip.
+        assert pairs[0] <= group.inputs["Veins"].default_value / 1.15 - 0.5 <= pairs[1]
+        relief[identifier] = group.inputs["Relief"].default_value
+    assert relief["beech"] > 1.5 * max(relief["birch"], relief["aspen"]) > 0.0
+
+
 def test_leaflets_have_their_own_length():
     """The relief of a leaflet is measured by the leaflet, whose UV map it has to itself."""
     rowan = catalog.load_species("rowan")

@@ -18,7 +18,7 @@ from ...optics import FACING, GLOSS, HAIRY, PALER, THROUGH_TINT
 from .nodes import LEAF_GREEN, Graph, Term, node_group
 
 # Raise this when nodes or numbers change; `blade_version` then makes new materials as well.
-_VERSION = 3
+_VERSION = 4
 
 UNIT = (0.0, 1.0)
 #: How much more than the mean of both sides the upper side mirrors: its wax is smooth, the underside hairy.

@@ -33,8 +33,8 @@ _PARALLEL, _NARROW, _PALMATE = 0.15, 0.3, 0.95
 _LOBED = 0.86
 #: Parallel veins across a blade.
 _ACROSS = 11.0
-#: Most teeth of one side in which veins end.
-_FEW = 10
+#: Most teeth of one side in which veins end; width over the distance of others, as of birches; relief of their blades.
+_FEW, _APART, _FLAT = 10, 5.4, 0.012
 _DIRECTIONS = tau * np.arange(48) / 48
 
 
@@ -54,8 +54,8 @@ def species_leaf_material(species: Species, kind: str) -> bpy.types.Material:
     leaflet = model.shape.length if model is not None and isinstance(model.shape, Compound) else 1.0
     looks = {"leaf_length": leaflet * _length(species, kind)}
     blade = "pinnate" if model is None else blade_kind(model, through, kind)
-    if model is not None and (veins := _number(model, blade)):
-        looks["veins"] = veins
+    if model is not None:
+        looks |= _venation(model, blade)
     return leaf_material(species.name if kind == "leaf" else f"{species.name} {kind}", blade, **looks)
 
 
@@ -98,15 +98,17 @@ def _outline(model: LeafModel) -> Blade | None:
     return shape if isinstance(shape, Blade) else None
 
 
-def _number(model: LeafModel, blade: str) -> float | None:
-    """Veins to a leaf's length where the outline tells: they end in lobes, and in teeth if these are few."""
+def _venation(model: LeafModel, blade: str) -> dict[str, float]:
+    """Veins to a leaf's length: they end in lobes or few teeth, and the blade swells between them; others are flat."""
     outline = _outline(model)
     if blade == "parallel":
-        return _ACROSS / max(_extent(model)[0] if outline is None else outline.width, 1e-3)
+        return {"veins": _ACROSS / max(_extent(model)[0] if outline is None else outline.width, 1e-3)}
     if outline is None or blade not in ("lobed", "pinnate"):
-        return None
+        return {}
     ends = outline.lobes if blade == "lobed" else outline.teeth
-    return 1.15 * (ends + 0.5) if 3 <= ends <= _FEW else None
+    if 3 <= ends <= _FEW:
+        return {"veins": 1.15 * (ends + 0.5)}
+    return {"veins": 1.15 * (min(_APART / outline.width, _FEW) + 0.5), "relief": _FLAT}
 
 
 def _extent(model: LeafModel) -> NDArray[np.floating]:
@@ -190,9 +192,7 @@ def _model_of(species: Species, source: bpy.types.Object, depsgraph: bpy.types.D
     with mesh_of(source.evaluated_get(depsgraph)) as mesh:
         arrays = read_mesh(mesh, [slot.material for slot in source.material_slots] or [None])
     if len(arrays.slots) == 0:
-        raise SpeciesError(
-            f'"{source.name}", the {kind} of "{species.name}", has no faces; add faces or choose another mesh'
-        )
+        raise SpeciesError(f'"{source.name}", the {kind} of "{species.name}", has no faces; choose a mesh with faces')
     offsets, corners = arrays.face_offsets, arrays.corner_verts
     model = leaf_model(arrays.positions, [corners[a:b].tolist() for a, b in pairwise(offsets)])
     if uv_map := arrays.rendered[0]:
