@@ -205,8 +205,10 @@ def test_variants_beyond_max_memory_are_refused(blender, tmp_path, monkeypatch):
 
 
 @pytest.mark.parametrize("ending", [".usdc", ".glb", ".obj"])
-@pytest.mark.parametrize("until", ["variants", "texture", "plants of", "writing", ""])
-@pytest.mark.parametrize("bake", [False, True])
+@pytest.mark.parametrize(
+    ("until", "bake"),
+    [("variants", False), ("texture", True), ("plants of", False), ("writing", True), ("", False), ("", True)],
+)
 def test_closing_the_steps_leaves_no_half_file_and_nothing_in_the_scene(blender, tmp_path, ending, until, bake):
     """Nor does an export that ends."""
     if ending == ".usdc" and compat.usd() is None:

@@ -230,7 +230,7 @@ def test_crowns_of_a_stand_above_are_measured_beside_the_window(monkeypatch, ren
     ground = _wood()
     _cover()
     select(ground)
-    _group().stand.years, _group().stand.density = 12, 1000.0
+    _group().stand.years, _group().stand.density, _group().stand.recruits = 4, 300.0, 0.0
     assert bpy.ops.tetflora.grow_stand() == {'FINISHED'}
     threads = set()
 
