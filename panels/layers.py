@@ -9,7 +9,7 @@ from ..operators.layers import grounds_to_plant
 from ..tetflora_addon.blender.biomes.layers import GROUP, STAND, active_layer, is_due, is_gone, kind_of, plants_in
 from ..tetflora_addon.blender.biomes.library import FALLBACK_ICON, biomes, icon_of, items
 from ..tetflora_addon.blender.placing.distances import follows_species, suggestion
-from ..tetflora_addon.blender.placing.rules import grounds_of
+from ..tetflora_addon.blender.placing.rules import grounds_seen
 from ..tetflora_addon.blender.scene.crowns import crown_to_draw
 from ..tetflora_addon.blender.scene.fields import has_history
 from ..tetflora_addon.blender.settings import BIOME, FIELD, SCATTER, active_in, rules_of
@@ -166,10 +166,9 @@ def TETFLORA_PT_layers(layout: bpy.types.UILayout, context: bpy.types.Context) -
     elif kind == GROUP:
         column.prop(layer, "gives_way")
     if (layer.kind != FIELD or kind == STAND) and (body := base.section(column, "Where", closed=False)):
-        there = grounds_of(scene, owner)
-        names = ", ".join(obj.name for obj in there[:2]) + (f" and {len(there) - 2:,} more" if len(there) > 2 else "")
+        names, missing, _ = grounds_seen(layer)
         base.draw_below(body, names or "None", "Ground")
-        for name in (entry.object.name for entry in owner.grounds if entry.object not in {None, *there}):
+        for name in missing[:3]:
             base.draw_message(context, body, f'"{name}" is not in the scene; choose Use Selected Meshes in the menu')
         base.draw_where(body, owner)
     if layer.kind == SCATTER and (body := base.section(column, "Spacing and Size")):

@@ -313,6 +313,22 @@ def test_grounds_are_looked_up_and_nothing_lists_all_objects_for_them(monkeypatc
     assert rules.grounds_of(scene, _population()) == []
 
 
+def test_grounds_in_sight_are_found_without_the_names_of_all_objects():
+    """Of 2,000 grounds among 100,000 objects that took 230 ms, and of one that was made last 100 ms."""
+
+    class Scene:
+        view_layers = bpy.context.scene.view_layers
+
+        @property
+        def objects(self):
+            pytest.fail("looked through all objects")
+
+    scene = _on_ground('SCATTER')
+    assert rules.grounds_of(Scene(), _population()) == [bpy.data.objects["ground"]]
+    bpy.data.objects["ground"].hide_set(True)  # what is hidden is looked for
+    assert rules.grounds_of(scene, _population()) == [bpy.data.objects["ground"]]
+
+
 def test_where_it_stands_goes_neither_into_copies_nor_into_files():
     scene = _on_ground('SCATTER')
     assert "stood_on" not in {prop.identifier for prop in rules.settings_of(_population())}
@@ -323,10 +339,11 @@ def test_where_it_stands_goes_neither_into_copies_nor_into_files():
 def test_a_ground_is_not_looked_at_while_panels_are_drawn(monkeypatch):
     """In a window; what was found last counts."""
     _on_ground('SCATTER')
+    seen = "ground", [], _population().stood_on
     monkeypatch.setattr(rules, "ground_form", lambda *_: pytest.fail("looked at a ground"))
-    monkeypatch.setattr(rules.changed_grounds, "of", lambda *_: {_population().uid: _population().stood_on})
+    monkeypatch.setattr(rules.seen_grounds, "of", lambda *_: {_population().uid: seen})
     assert layers.is_due(_population())
-    monkeypatch.setattr(rules.changed_grounds, "of", lambda *_: None)
+    monkeypatch.setattr(rules.seen_grounds, "of", lambda *_: None)
     assert not layers.is_due(_population())
 
 
@@ -336,8 +353,8 @@ def test_after_update_nothing_is_due_at_once_though_grounds_were_not_looked_at_a
     scene = _on_ground(kind)
     _set("ground", location=(0.0, 0.0, 2.0))
     bpy.context.view_layer.update()
-    found = run_to_end(rules.changed_steps(scene, bpy.context.view_layer))
-    monkeypatch.setattr(rules.changed_grounds, "of", lambda *_: found)
+    found = run_to_end(rules.ground_steps(scene, bpy.context.view_layer))
+    monkeypatch.setattr(rules.seen_grounds, "of", lambda *_: found)
     assert layers.is_due(_population())
     assert bpy.ops.tetflora.update_layers() == {'FINISHED'}
     assert not layers.is_due(_population())
