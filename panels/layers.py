@@ -77,7 +77,8 @@ def TETFLORA_PT_add_layer(layout: bpy.types.UILayout, context: bpy.types.Context
     """What can grow on the selected meshes; opened from the list of layers."""
     grounds = grounds_to_plant(context)
     more = f" and {len(grounds) - 1:,} more" if len(grounds) > 1 else ""
-    layout.label(text=f"On {grounds[0].name}{more}" if grounds else "Select a mesh to plant on", icon='MESH_GRID')
+    text = "A biome brings land of its own; select a mesh to plant on it"
+    layout.label(text=f"On {grounds[0].name}{more}" if grounds else text, icon='MESH_GRID')
     pictures = layout.grid_flow(row_major=True, columns=4, even_columns=True, even_rows=True)
     known = biomes()
     for identifier, name, _, icon, _ in items():
@@ -153,7 +154,7 @@ def TETFLORA_PT_layers(layout: bpy.types.UILayout, context: bpy.types.Context) -
     base.Button("update_layers", 'FILE_REFRESH').draw(row)
     base.Button("update_layers", 'MOD_NOISE', "", {"which": 'ACTIVE', "reroll": True}).draw(row)
     row.prop(context.window_manager, "tetflora_points", text="", icon='PARTICLE_POINT')
-    layout.label(text=_status(layer, len(group.layers) > 0), icon='INFO')
+    layout.label(text=_status(layer, not all(map(is_gone, group.layers))), icon='INFO')
     if layer is None:
         return
     column = layout.column()

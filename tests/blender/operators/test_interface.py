@@ -91,6 +91,25 @@ def test_a_ground_that_is_not_in_the_scene_is_told_as_missing_with_what_to_do():
     assert '"meadow" is not in the scene; choose Use Selected Meshes' in labels()
 
 
+def test_a_list_whose_only_layer_was_deleted_with_its_object_is_said_to_be_empty():
+    """*Select a layer* stood below a list without rows."""
+    select(add_mesh("ground", size=20.0))
+    bpy.context.scene.tetflora.stand.years = 2
+    bpy.ops.tetflora.grow_stand()
+    bpy.data.objects.remove(active_layer(bpy.context.scene).field)
+    layout = Layout()
+    interface.drawn(layers.TETFLORA_PT_layers, interface._context(), layout)
+    assert "Click + to let something grow" in [options.get("text") for _, _, options in layout.drawn]
+
+
+def test_without_a_selected_mesh_biomes_are_said_to_bring_land():
+    """*Select a mesh to plant on* stood above biomes that need none."""
+    layout = Layout()
+    interface.drawn(layers.TETFLORA_PT_add_layer, interface._context(), layout)
+    texts = [options.get("text") or "" for _, _, options in layout.drawn]
+    assert "A biome brings land of its own; select a mesh to plant on it" in texts
+
+
 def test_grounds_are_not_looked_up_while_panels_are_drawn(monkeypatch):
     """In a window; each draw of a layer on 2,000 meshes took 240 ms."""
 
