@@ -4,6 +4,8 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import blf
 import bpy
 import pytest
@@ -100,6 +102,20 @@ def test_a_list_whose_only_layer_was_deleted_with_its_object_is_said_to_be_empty
     layout = Layout()
     interface.drawn(layers.TETFLORA_PT_layers, interface._context(), layout)
     assert "Click + to let something grow" in [options.get("text") for _, _, options in layout.drawn]
+
+
+@pytest.mark.parametrize("width", [220, 292])
+@pytest.mark.parametrize("name", ["Grid", "Plane", "North slope", "Meadow 1", "A"])
+def test_lines_of_messages_fit_into_a_section_of_the_sidebar(width, name):
+    """80 pixels are tabs, margins and the icon, measured in the window: *Use Selected* was cut to *Use Sel...*"""
+    blf.size(0, 11)
+    layout = Layout()
+    region = SimpleNamespace(width=width)
+    text = f'"{name}" is not in the scene; choose Use Selected Meshes in the menu'
+    base.draw_message(interface._context(region=region), layout, text)
+    lines = [options["text"] for kind, _, options in layout.drawn if kind == "label"]
+    assert " ".join(lines) == text
+    assert max(blf.dimensions(0, line)[0] for line in lines) <= width - 80
 
 
 def test_without_a_selected_mesh_biomes_are_said_to_bring_land():
