@@ -201,7 +201,7 @@ def awaits_update(population: bpy.types.PropertyGroup) -> bool:
     if not population.uid or population.frozen:
         return False
     home, uid, every = population.collection, population.uid, population.id_data.objects
-    gone = not (home and home.objects) and len(bpy.data.objects) < 500  # or a draw of panels would take too long
+    gone = not (home and home.objects) and not bpy.data.objects[500:501]  # or a draw of panels would take too long
     outdated = not population.made or population.placed_by != fingerprint(population) or on_changed_ground(population)
     return outdated or (gone and all(o.tetflora.population != uid for o in every))
 
