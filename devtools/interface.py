@@ -162,10 +162,17 @@ def _only(obj: Any) -> None:
 
 
 def _many() -> None:
-    """A scene with very many objects, some of them plants."""
+    """A scene with very many objects, some of them plants, and a layer that grows on some thousand meshes."""
     import bpy
 
-    collection = bpy.data.collections.new("many")
+    collection, grounds = bpy.data.collections.new("many"), bpy.data.collections.new("grounds")
+    mesh = bpy.data.meshes.new("ground")
+    for number in range(2000):
+        grounds.objects.link(bpy.data.objects.new(f"g{number}", mesh))
+    bpy.context.scene.collection.children.link(grounds)
+    layer = bpy.context.scene.tetflora.layers.add()
+    layer.kind, layer.uid, layer.ground_collection = 'SCATTER', "grounds", grounds
+    bpy.context.scene.tetflora.layers_index = len(bpy.context.scene.tetflora.layers) - 1
     for number in range(OBJECTS):
         obj = bpy.data.objects.new(f"o{number}", None)
         collection.objects.link(obj)
@@ -181,9 +188,11 @@ def _as_in_a_window() -> None:
 
     from panels import refine
     from tetflora_addon.blender.biomes import library
+    from tetflora_addon.blender.placing import rules
     from tetflora_addon.blender.results.collection import Results
     from tetflora_addon.blender.species import catalog, edits
     from tetflora_addon.blender.viewport import auto
+    from tetflora_addon.jobs import run_to_end
 
     for module in (library, catalog, edits):
         module._TRUSTED = 60.0
@@ -197,6 +206,8 @@ def _as_in_a_window() -> None:
     results.finish()
     auto.note_results(scene, made_for := auto.results_made_for(scene))
     auto._outlook.of = lambda _scene, _layer: made_for
+    seen = run_to_end(rules.ground_steps(scene, layer))
+    rules.seen_grounds.of = lambda _scene, _layer: seen
 
 
 def _milliseconds(draw: Callable[[], object]) -> float:

@@ -1,8 +1,6 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The list of layers: update, move, duplicate and remove them, change their ground, save them as a biome; and add to it
-a biome, a cover, a stand and its years. `add` scatters populations.
-"""
+"""Layers: update, move, duplicate, remove and save them; add biomes, covers and stands. `add` scatters."""
 
 from contextlib import closing
 
@@ -19,7 +17,7 @@ from ..tetflora_addon.blender.declare import boolean, choice, once, string
 from ..tetflora_addon.blender.placing import cover, populations
 from ..tetflora_addon.blender.placing.first_forest import is_startup
 from ..tetflora_addon.blender.placing.populations import PlacedPlants, make_plants_steps, remove_layer, reroll_steps
-from ..tetflora_addon.blender.placing.rules import active_population, grounds_of, set_grounds
+from ..tetflora_addon.blender.placing.rules import active_population, grounds_of, grounds_seen, set_grounds
 from ..tetflora_addon.blender.runtime import is_there
 from ..tetflora_addon.blender.settings import BIOME, FIELD, SCATTER, rules_of, with_identity
 from ..tetflora_addon.blender.species.edits import grow_in_wood
@@ -127,15 +125,14 @@ class TETFLORA_OT_update_layers(_InParts, Operator, label="Update", needs=_ACTIV
     def steps(self, context: bpy.types.Context) -> Job[Updated | None]:
         scene, depsgraph = context.scene, context.evaluated_depsgraph_get()
         active, one = layers.active_layer(scene), self.which != 'DUE'
+        every = (*layers.children_of(active), active) if one else ()
         if self.which == 'WOOD':
-            every = (*layers.children_of(active), active)
             grown = (layer.mix for layer in every if layer.kind == SCATTER and not layer.frozen)
             grow_in_wood(scene, [entry for mix in grown for entry in mix])
         if one and active.kind == BIOME and not self.reroll:
             added = yield from adding.plant_biome_steps(scene, depsgraph, active)
             return [number for _, number in added.layers], added.bare, added.kept
-        uids = [layer.uid for layer in (*layers.children_of(active), active) if layer.kind != BIOME] if one else []
-        uids = uids if one else layers.due_layers(scene)
+        uids = [layer.uid for layer in every if layer.kind != BIOME] if one else layers.due_layers(scene)
         return (yield from self._each(scene, depsgraph, uids)) if uids else None
 
     def _each(self, scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, uids: list[str]) -> Job[Updated]:
@@ -179,8 +176,11 @@ class TETFLORA_OT_update_layers(_InParts, Operator, label="Update", needs=_ACTIV
 
     def finish(self, context: bpy.types.Context, result: Updated | None) -> set[str]:
         if result is None:
-            more = "If a mask, area or path has, choose Update This Layer in the menu beside the list"
-            self.report({'INFO'}, f"No setting and no ground has changed since the layers were grown. {more}")
+            text = "No setting and no ground has changed since the layers were grown. If a mask, area or path has, "
+            text += "choose Update This Layer in the menu beside the list"
+            for name in (name for one in context.scene.tetflora.layers for name in grounds_seen(one)[1]):
+                text = f'"{name}" is not in the scene; select a ground and choose Use Selected Meshes in the menu'
+            self.report({'INFO'}, text)
             return {'CANCELLED'}
         points.schedule()
         context.scene.update_tag()

@@ -85,10 +85,10 @@ def draw_message(
 ) -> None:
     """A text over several lines, because Blender does not wrap; a letter is some 7 pixels wide at a scale of 1.
 
-    ``width`` is that of a popover at a scale of 1; that of the region if not given.
+    ``width`` is that of a popover at a scale of 1; that of the region, which has tabs and sections, if not given.
     """
     scale = context.preferences.system.ui_scale or 1.0  # 0 without a window
-    letters = (width or context.region.width / scale) / 7.0
+    letters = (width or context.region.width / scale - 35.0) / 7.0
     column = layout.column(align=True)
     for n, line in enumerate(wrap(text, max(int(letters) - 4, 16))):
         column.label(text=line, icon='BLANK1' if n else icon)

@@ -9,7 +9,7 @@ from ..operators.layers import grounds_to_plant
 from ..tetflora_addon.blender.biomes.layers import GROUP, STAND, active_layer, is_due, is_gone, kind_of, plants_in
 from ..tetflora_addon.blender.biomes.library import FALLBACK_ICON, biomes, icon_of, items
 from ..tetflora_addon.blender.placing.distances import follows_species, suggestion
-from ..tetflora_addon.blender.placing.rules import grounds_of
+from ..tetflora_addon.blender.placing.rules import grounds_seen
 from ..tetflora_addon.blender.scene.crowns import crown_to_draw
 from ..tetflora_addon.blender.scene.fields import has_history
 from ..tetflora_addon.blender.settings import BIOME, FIELD, SCATTER, active_in, rules_of
@@ -77,7 +77,8 @@ def TETFLORA_PT_add_layer(layout: bpy.types.UILayout, context: bpy.types.Context
     """What can grow on the selected meshes; opened from the list of layers."""
     grounds = grounds_to_plant(context)
     more = f" and {len(grounds) - 1:,} more" if len(grounds) > 1 else ""
-    layout.label(text=f"On {grounds[0].name}{more}" if grounds else "Select a mesh to plant on", icon='MESH_GRID')
+    text = "A biome brings land of its own; select a mesh to plant on it"
+    layout.label(text=f"On {grounds[0].name}{more}" if grounds else text, icon='MESH_GRID')
     pictures = layout.grid_flow(row_major=True, columns=4, even_columns=True, even_rows=True)
     known = biomes()
     for identifier, name, _, icon, _ in items():
@@ -153,7 +154,7 @@ def TETFLORA_PT_layers(layout: bpy.types.UILayout, context: bpy.types.Context) -
     base.Button("update_layers", 'FILE_REFRESH').draw(row)
     base.Button("update_layers", 'MOD_NOISE', "", {"which": 'ACTIVE', "reroll": True}).draw(row)
     row.prop(context.window_manager, "tetflora_points", text="", icon='PARTICLE_POINT')
-    layout.label(text=_status(layer, len(group.layers) > 0), icon='INFO')
+    layout.label(text=_status(layer, not all(map(is_gone, group.layers))), icon='INFO')
     if layer is None:
         return
     column = layout.column()
@@ -166,10 +167,9 @@ def TETFLORA_PT_layers(layout: bpy.types.UILayout, context: bpy.types.Context) -
     elif kind == GROUP:
         column.prop(layer, "gives_way")
     if (layer.kind != FIELD or kind == STAND) and (body := base.section(column, "Where", closed=False)):
-        there = grounds_of(scene, owner)
-        names = ", ".join(obj.name for obj in there[:2]) + (f" and {len(there) - 2:,} more" if len(there) > 2 else "")
+        names, missing, _ = grounds_seen(layer)
         base.draw_below(body, names or "None", "Ground")
-        for name in (entry.object.name for entry in owner.grounds if entry.object not in {None, *there}):
+        for name in missing[:3]:
             base.draw_message(context, body, f'"{name}" is not in the scene; choose Use Selected Meshes in the menu')
         base.draw_where(body, owner)
     if layer.kind == SCATTER and (body := base.section(column, "Spacing and Size")):

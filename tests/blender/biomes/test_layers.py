@@ -176,6 +176,22 @@ def test_update_grows_what_is_due_and_nothing_else(capfd):
     assert [layer.made for layer in _group().layers] == [3, 6]
 
 
+@pytest.mark.parametrize("kind", ['SCATTER', 'STAND'])
+def test_update_of_a_layer_whose_ground_is_gone_says_so(kind, capfd):
+    """It said that no ground had changed."""
+    ground = _ground(size=20.0)
+    select(ground)
+    _group().stand.years, _group().stand.density = 2, 100.0
+    assert (_ops().populate(count=4, species="bush") if kind == 'SCATTER' else _ops().grow_stand()) == {'FINISHED'}
+    bpy.context.scene.collection.objects.unlink(ground)
+    bpy.context.view_layer.update()
+    capfd.readouterr()
+    assert _ops().update_layers() == {'CANCELLED'}
+    said = capfd.readouterr().out
+    assert f'Info: "{ground.name}" is not in the scene; select a ground and choose Use Selected Meshes' in said
+    assert "No setting and no ground" not in said
+
+
 def test_trees_of_a_layer_grow_in_a_wood_and_free_again():
     def species():
         return {o.tetflora.species for o in bpy.context.scene.objects if o.tetflora.is_plant}

@@ -4,6 +4,8 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import bpy
 import numpy as np
 import pytest
@@ -313,6 +315,42 @@ def test_grounds_are_looked_up_and_nothing_lists_all_objects_for_them(monkeypatc
     assert rules.grounds_of(scene, _population()) == []
 
 
+def test_grounds_in_sight_are_found_without_the_names_of_all_objects():
+    """Of 2,000 grounds among 20,000 objects that took 230 ms, and of one that was made last 20 ms."""
+
+    class Scene:
+        view_layers = bpy.context.scene.view_layers
+
+        @property
+        def objects(self):
+            pytest.fail("looked through all objects")
+
+    scene = _on_ground('SCATTER')
+    assert rules.grounds_of(Scene(), _population()) == [bpy.data.objects["ground"]]
+    bpy.data.objects["ground"].hide_set(True)  # what is hidden is looked for
+    assert rules.grounds_of(scene, _population()) == [bpy.data.objects["ground"]]
+
+
+@pytest.mark.parametrize("many", [False, True])
+def test_objects_of_the_file_are_not_counted_while_panels_are_drawn(monkeypatch, many):
+    """Of 20,000 that took 5 ms for each layer that was not placed yet, twice in each draw."""
+
+    class Objects:
+        def __len__(self):
+            pytest.fail("counted all objects")
+
+        def __getitem__(self, some):
+            assert some.stop - some.start == 1 and some.start <= 500
+            return [None] * many
+
+    population = _populate()
+    for obj in list(population.collection.objects):
+        bpy.data.objects.remove(obj)
+    data = SimpleNamespace(objects=Objects())
+    monkeypatch.setattr(rules, "bpy", SimpleNamespace(data=data, context=bpy.context, types=bpy.types))
+    assert _outdated() is not many  # of many, their plants are not looked for
+
+
 def test_where_it_stands_goes_neither_into_copies_nor_into_files():
     scene = _on_ground('SCATTER')
     assert "stood_on" not in {prop.identifier for prop in rules.settings_of(_population())}
@@ -323,10 +361,11 @@ def test_where_it_stands_goes_neither_into_copies_nor_into_files():
 def test_a_ground_is_not_looked_at_while_panels_are_drawn(monkeypatch):
     """In a window; what was found last counts."""
     _on_ground('SCATTER')
+    seen = "ground", [], _population().stood_on
     monkeypatch.setattr(rules, "ground_form", lambda *_: pytest.fail("looked at a ground"))
-    monkeypatch.setattr(rules.changed_grounds, "of", lambda *_: {_population().uid: _population().stood_on})
+    monkeypatch.setattr(rules.seen_grounds, "of", lambda *_: {_population().uid: seen})
     assert layers.is_due(_population())
-    monkeypatch.setattr(rules.changed_grounds, "of", lambda *_: None)
+    monkeypatch.setattr(rules.seen_grounds, "of", lambda *_: None)
     assert not layers.is_due(_population())
 
 
@@ -336,8 +375,8 @@ def test_after_update_nothing_is_due_at_once_though_grounds_were_not_looked_at_a
     scene = _on_ground(kind)
     _set("ground", location=(0.0, 0.0, 2.0))
     bpy.context.view_layer.update()
-    found = run_to_end(rules.changed_steps(scene, bpy.context.view_layer))
-    monkeypatch.setattr(rules.changed_grounds, "of", lambda *_: found)
+    found = run_to_end(rules.ground_steps(scene, bpy.context.view_layer))
+    monkeypatch.setattr(rules.seen_grounds, "of", lambda *_: found)
     assert layers.is_due(_population())
     assert bpy.ops.tetflora.update_layers() == {'FINISHED'}
     assert not layers.is_due(_population())

@@ -80,8 +80,8 @@ def is_due(layer: Layer) -> bool:
 
 def due_layers(scene: bpy.types.Scene) -> list[str]:
     """Identities of all layers that an update would change, but biomes, whose layers are among them; reads grounds."""
-    layers, moved = scene.tetflora.layers, run_to_end(rules.changed_steps(scene, bpy.context.view_layer))
-    return [one.uid for one in layers if one.kind != BIOME and (is_due(one) or (one.uid in moved and not one.frozen))]
+    layers, seen = scene.tetflora.layers, run_to_end(rules.ground_steps(scene, bpy.context.view_layer))
+    return [one.uid for one in layers if one.kind != BIOME and (is_due(one) or (seen[one.uid][-1] and not one.frozen))]
 
 
 def is_gone(layer: Layer) -> bool:

@@ -342,7 +342,7 @@ class TetFloraBrush(
         "Species",
         "What to paint",
         (
-            ('MIX', "As the Active Layer", "The species of the active layer, by weight", 0),
+            ('MIX', "Active Layer", "The species of the active layer, by weight", 0),
             ('ONE', "One Species", "The species below", 1),
         ),
         **FIXED,

@@ -72,10 +72,7 @@ def is_limited(biome: bpy.types.PropertyGroup) -> bool:
 
 
 def come_before(scene: bpy.types.Scene, biome: bpy.types.PropertyGroup) -> list[bpy.types.PropertyGroup]:
-    """Biomes to which one gives way: those with limits that stand above it or, if it has none itself, all of them.
-
-    Only where they share a ground.
-    """
+    """Biomes with limits on a shared ground to which one gives way: those above it or, if it has none itself, all."""
     if not biome.gives_way:
         return []
     own, others = {entry.object for entry in biome.grounds}, biomes_in(scene)
@@ -204,7 +201,7 @@ def awaits_update(population: bpy.types.PropertyGroup) -> bool:
     if not population.uid or population.frozen:
         return False
     home, uid, every = population.collection, population.uid, population.id_data.objects
-    gone = not (home and home.objects) and len(bpy.data.objects) < 500  # or a draw of panels would take too long
+    gone = not (home and home.objects) and not bpy.data.objects[500:501]  # or a draw of panels would take too long
     outdated = not population.made or population.placed_by != fingerprint(population) or on_changed_ground(population)
     return outdated or (gone and all(o.tetflora.population != uid for o in every))
 
@@ -215,25 +212,33 @@ def forms_of(grounds: Iterable[bpy.types.Object], form: Callable[[bpy.types.Obje
     return " ".join(forms) if all(forms) else ""
 
 
-def changed_steps(scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer) -> Generator[None, None, dict[str, str]]:
-    """Layers of which a ground was moved or edited since their plants were placed: identities, and where they stood."""
-    found, form = {}, cache(lambda obj: ground_form(obj, view_layer.depsgraph))
-    kept = ((one.uid, rules_of(one)) for one in scene.tetflora.layers)
-    for uid, before, grounds in [(uid, one.stood_on, grounds_of(scene, one)) for uid, one in kept if one.stood_on]:
-        found |= {uid: before} if lies_elsewhere(before, forms_of(grounds, form)) else {}
+def ground_steps(scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer) -> Generator[None, None, dict[str, tuple]]:
+    """Of each layer names of its grounds, those not in the scene, and where plants stood if one was changed since."""
+    seen, form = {}, cache(lambda obj: ground_form(obj, view_layer.depsgraph))
+    kept = [(one.uid, rules_of(one)) for one in scene.tetflora.layers]
+    read = [(uid, one.stood_on, grounds_of(scene, one), [e.object for e in one.grounds]) for uid, one in kept]
+    for uid, before, there, named in read:
+        moved, present = before and lies_elsewhere(before, forms_of(there, form)), {None, *there}
+        names = ", ".join(obj.name for obj in there[:2]) + (f" and {len(there) - 2:,} more" if len(there) > 2 else "")
+        seen[uid] = names, [obj.name for obj in named if obj not in present], before if moved else ""
         yield
-    return found
+    return seen
 
 
-#: What `changed_steps` found, a moment after each change.
-changed_grounds = Outlook(changed_steps)
-register, unregister = changed_grounds.register, changed_grounds.unregister
+#: What `ground_steps` found, a moment after each change.
+seen_grounds = Outlook(ground_steps)
+register, unregister = seen_grounds.register, seen_grounds.unregister
+
+
+def grounds_seen(layer: bpy.types.PropertyGroup) -> tuple[str, list[str], str]:
+    """What was found last of the grounds of a layer; cheap."""
+    seen = seen_grounds.of(layer.id_data, bpy.context.view_layer) or {}
+    return seen.get(layer.uid, ("…", [], ""))
 
 
 def on_changed_ground(layer: bpy.types.PropertyGroup) -> bool:
-    """Whether a layer is one of them, as it was found last, and was not grown again since; cheap."""
-    found = changed_grounds.of(layer.id_data, bpy.context.view_layer) or {}
-    return found.get(layer.uid) == rules_of(layer).stood_on
+    """Whether a ground was changed, as it was found last, and the layer was not grown again since; cheap."""
+    return grounds_seen(layer)[-1] == rules_of(layer).stood_on != ""
 
 
 def free_seed(scene: bpy.types.Scene, seed: int) -> int:
@@ -288,16 +293,9 @@ def rules_from(population: bpy.types.PropertyGroup) -> tuple[Rules, tuple[str, .
     free = ("min_distance", "altitude_min", "altitude_max", "density", "weights", "companions")
     given = {name: getattr(population, name) for name in Rules.__dataclass_fields__ if name not in free}
     low, high = (population.altitude_min, population.altitude_max) if population.use_altitude else (-inf, inf)
-    rules = Rules(
-        **given,
-        min_distance=distance_of(population),
-        altitude_min=low,
-        altitude_max=high,
-        density=population.density / HECTARE,
-        weights=tuple(weights.values()),
-        companions=companions,
-    )
-    return rules, species
+    given |= {"min_distance": distance_of(population), "altitude_min": low, "altitude_max": high}
+    density, every = population.density / HECTARE, tuple(weights.values())
+    return Rules(**given, density=density, weights=every, companions=companions), species
 
 
 def makes_field(population: bpy.types.PropertyGroup, number: int) -> bool:
@@ -331,8 +329,10 @@ def grounds_of(scene: bpy.types.Scene, population: bpy.types.PropertyGroup) -> l
     if getattr(population, "ground_collection", None) is not None:  # stands have none
         named += objects_within(population.ground_collection)
     meshes = dict.fromkeys(o for o in named if o is not None and o.type == 'MESH' and not o.tetflora.is_field)
-    there = ((o, scene.objects.get(o.name)) for o in meshes)  # `users_scene` lists all objects
-    return [o for o, found in there if o == found or (found is not None and scene in o.users_scene)]
+    # Most are seen in a view layer, which needs no look through all objects.
+    seen = {o for o in meshes if any(o.visible_get(view_layer=one) for one in scene.view_layers)}
+    there = seen if len(seen) == len(meshes) else {*scene.objects}
+    return [o for o in meshes if o in there]
 
 
 def checked_grounds(scene: bpy.types.Scene, population: bpy.types.PropertyGroup) -> list[bpy.types.Object]:
