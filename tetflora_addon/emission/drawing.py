@@ -249,10 +249,9 @@ def _tiles(given: Drawing) -> tuple[list[_Item], list[Arrays], list[Shown]]:
 def _drawn_tile(given: Drawing, item: _Item) -> list[Block | Parts | Shown]:
     """All that is drawn of one tile, or of parts that are out of view."""
     number, columns, parts, share = item
-    most = share * given.most
-    expected, known = FULL * most, None
-    for _ in range(_TRIES):
-        tile = _Tile(given, columns)
+    expected, known = FULL * (most := share * given.most), None
+    for left in reversed(range(_TRIES)):
+        tile = _Tile(given, columns, not left)
         if columns is None:  # parts out of view, a share of all of them
             tile._draw_outside(list(map(tile.frontier.pool, given.kinds, parts)), share, _UNSEEN * most)
         else:
@@ -266,11 +265,11 @@ def _drawn_tile(given: Drawing, item: _Item) -> list[Block | Parts | Shown]:
 class _Tile(Canvas):
     """One tile while it is drawn."""
 
-    def __init__(self, given: Drawing, columns: tuple[int, int] | None) -> None:
+    def __init__(self, given: Drawing, columns: tuple[int, int] | None, last: bool) -> None:
         more = int(given.smaller * AROUND)
         around = None if columns is None else (columns[0] - more, columns[1] + more)
         super().__init__(Coverage(given.camera, around or (0, 1)))
-        self.given, self.frontier = given, Frontier(given.kinds, self.coverage, given.facet)
+        self.given, self.last, self.frontier = given, last, Frontier(given.kinds, self.coverage, given.facet)
         self._facets: dict[tuple[Whose, bool], list[Primitive]] = {}
         self._left = 0.5 / given.hidden**2  # part of hidden facets that stay where nothing near can stand for them
         self._drawn = 0.0  # those of what is seen
@@ -315,20 +314,22 @@ class _Tile(Canvas):
             if few or (before > room and not known):  # what is not drawn hides nothing: all behind it would be opened
                 self.asked, self.again = self.asked + follow, not few
                 return
+            if before > room and not self.last:  # drawn to know how many there would be, and let go
+                self.again, self.meshes, self._facets = True, {}, {}
             frontier.facet, frontier.kinds = times * given.facet, [kind.coarser(times) for kind in given.kinds]
             for number, (kind, slab) in enumerate(zip(frontier.kinds, slabs, strict=True)):
-                if self.number > room:
-                    self.again = self.again or bool(len(slab)) or None
+                if self.number > room and self.last:
                     frontier.hidden[number].append(slab)
-                    self.asked += float(slab.count.sum())  # the sides that are told are those of all that is seen
+                    self.asked += times**FEWER * float(slab.count.sum())  # sides are told of all that is seen
                 elif len(slab):
                     side = kind.larger * frontier.facet * given.camera.extent_around(slab.center)
                     kind.draw(self, slab, side, frontier.shown)
             self._cover()
             self.asked += times**FEWER * (self.number - before)
         self._drawn = self.number
-        if self.coarser > _LARGER * max((self.asked / room) ** (1.0 / FEWER), given.finest) and not known:
+        if self.again or (self.coarser > _LARGER * max((self.asked / room) ** (1 / FEWER), given.finest) and not known):
             self.again = True
+            return
         self._draw_hidden(list(map(Waiting.concatenate, frontier.hidden)), self._few(HIDDEN_A_PIXEL, share, most))
         # What is outside of a tile's own image was part of something inside: it lies near the border.
         self._draw_outside(list(map(Waiting.concatenate, frontier.outside)), share, most)
@@ -479,9 +480,8 @@ class _Tile(Canvas):
         """Sides (n,) of facets of parts out of view, meters."""
         away = self.given.camera.distance_to_view(pool.center)
         fallen = self.given.shadows.distance(pool.center, away, pool.radius)
-        part, nearest, far = _BESIDE
+        (part, nearest, far), (soft, least) = _BESIDE, _THROWN
         away = np.maximum(away, nearest)
-        soft, least = _THROWN
         fallen = np.maximum(fallen, least) * np.maximum(fallen / FALLEN, 1.0)
         return np.minimum(part * away * (1.0 + (away / far) ** 2), soft * fallen)
 

@@ -273,6 +273,35 @@ def test_stand_ins_of_linked_and_hidden_objects_and_of_nothing(woods):
     assert seen() == ["bare", "house", "rock", "scatter", "spade"]
 
 
+def test_all_that_is_switched_while_originals_are_read_is_handed_to_the_main_thread(woods, monkeypatch):
+    """In a render its own thread hid them again: Blender crashed in the second frame of an animation."""
+    sheet, rock, called = add_mesh("sheet"), add_mesh("rock"), []
+    home = bpy.data.collections.new("home")
+    bpy.context.scene.collection.children.link(home)
+    home.objects.link(sheet)
+    bpy.context.scene.collection.objects.unlink(sheet)
+    home.hide_viewport = True
+
+    def switches():
+        flags = [(o.name, o.hide_render, o.hide_viewport, len(o.users_collection)) for o in bpy.data.objects]
+        return flags, seen(), len(bpy.data.collections)
+
+    def watched(function):
+        before = switches()
+        function()
+        called.append((before, switches()))
+
+    hide(woods.objects["scatter"], rock)
+    for name in ("in_main_thread", "restore_in_main_thread"):
+        monkeypatch.setattr(hiding, name, watched, raising=False)
+    outside, graph = switches(), depsgraph()
+    with hiding.originals_shown(bpy.context.scene, graph):
+        inside = switches()
+    assert inside != outside
+    assert called == [(outside, inside), (inside, outside)]
+    assert switches() == outside
+
+
 def test_particles_that_instance_go_and_hair_stays(clean_file):
     ground, tree = forest()
     for kind in ('OBJECT', 'PATH'):

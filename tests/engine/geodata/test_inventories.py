@@ -394,6 +394,22 @@ def test_a_preview_has_each_column_with_three_values(tmp_path):
     assert {column.field for column in preview(path)} <= set(FIELDS)
 
 
+@pytest.mark.parametrize(
+    "text",
+    [
+        "species,crown height,height,x,y\noak,4,30,0,0\noak,5,20,5,5\n",
+        "species,height_class,height,x,y\noak,2,30,0,0\noak,3,20,5,5\n",
+    ],
+)
+def test_what_a_preview_proposes_is_what_is_read_without_it(tmp_path, text):
+    """The dialog hands over what it proposed for each column."""
+    plain = _read(tmp_path, text)
+    proposed = {column.title: column.field for column in preview(tmp_path / "a.csv")}
+    chosen = _read(tmp_path, text, columns=proposed)
+    assert plain.sizes["height"].tolist() == chosen.sizes["height"].tolist() == [30.0, 20.0]
+    assert plain.notes == chosen.notes
+
+
 def test_classes_without_their_sizes_do_not_count(tmp_path):
     found = _read(tmp_path, "species,height_class,x,y\noak,2,0,0\noak,3,5,5\n")
     assert not found.sizes["height"].any()
