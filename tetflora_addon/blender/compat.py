@@ -21,9 +21,7 @@ def eevee_engine() -> str:
     for identifier in EEVEE_ENGINES:
         if identifier in known:
             return identifier
-    raise LookupError(
-        f"This version of Blender has none of the engines {', '.join(EEVEE_ENGINES)} and is not supported"
-    )
+    raise LookupError(f"This Blender has none of the engines {', '.join(EEVEE_ENGINES)} and is not supported")
 
 
 def handlers(name: str) -> list:
@@ -117,6 +115,14 @@ def set_node_input(modifier: bpy.types.NodesModifier, identifier: str, value: ob
 def stored_inputs(modifier: bpy.types.Modifier) -> list[tuple[str, object]]:
     """Inputs of a modifier's geometry nodes where they are custom properties, before 5.2; later they are settings."""
     return [] if modifier.type != 'NODES' or hasattr(modifier, "properties") else list(modifier.items())
+
+
+def node_inputs(modifier: bpy.types.Modifier) -> list[bpy.types.ID]:
+    """Datablocks that inputs of a modifier's geometry nodes name; none of other modifiers."""
+    inputs = modifier.properties.inputs if hasattr(modifier, "properties") else None
+    names = [prop.identifier for prop in inputs.bl_rna.properties] if inputs else []
+    given = [getattr(getattr(inputs, name), "value", None) for name in names]
+    return [one for one in (*given, *dict(stored_inputs(modifier)).values()) if isinstance(one, bpy.types.ID)]
 
 
 def usd() -> SimpleNamespace | None:

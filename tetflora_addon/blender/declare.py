@@ -14,6 +14,8 @@ from bpy import props
 
 #: Options of what cannot be animated, and of what panels do not show.
 FIXED, HIDDEN = {"options": set()}, {"options": {'HIDDEN'}}
+#: Custom property of a result collection: 'VIEW' for the artist's results, 'RENDER' for those of a running render.
+PURPOSE = "tetflora_purpose"
 
 
 def _kind(make: Callable[..., Any], *names: str) -> Callable[..., Any]:

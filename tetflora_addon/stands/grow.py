@@ -626,9 +626,7 @@ class GrowingStand:
                 "ground"
             )
         if len(self.plants) > MOST_PLANTS:
-            raise TetFloraError(
-                f"The stand has more than {MOST_PLANTS:,} plants; lower Seedlings, or choose a smaller ground"
-            )
+            raise TetFloraError(f"The stand has over {MOST_PLANTS:,} plants; lower Seedlings, or use a smaller ground")
 
     def _recorded(self, year: int, record: bool) -> Plants:
         """Plants, of which those that are tall enough are recorded, or only those that are new."""

@@ -189,9 +189,7 @@ class LightGrid:
         tallest = float(crowns.height.max(initial=0.5)) + (0.0 if self.ground is None else _STEEP)
         layers = int(layer_of(np.array([tallest + 0.01]))[0][0]) + 1
         if (layers + 1) * self.rows * self.columns > MOST_VOXELS:
-            raise TetFloraError(
-                "The ground is too large for columns this narrow; raise Cell, or choose a smaller ground"
-            )
+            raise TetFloraError("The ground is too large for columns this narrow; raise Cell, or use a smaller ground")
         strip = np.clip(((crowns.y + self.margin) / self.cell).astype(np.int64), 0, self.rows - 1) // self.strip
         order = np.argsort(strip, kind="stable")
         ends = np.searchsorted(strip[order], np.arange(len(self.strips) + 1))

@@ -211,7 +211,7 @@ def test_a_deleted_asset_is_named_and_comes_back():
     assert len(read()[0]) == 5
     select(asset)
     bpy.ops.object.delete()
-    with pytest.raises(SceneError, match=r'"plant 0", "plant 1", "plant 2" and 2 more: "tree".*was deleted; undo that'):
+    with pytest.raises(SceneError, match=r'"plant 0", "plant 1", "plant 2" and 2 more: "tree".*was deleted; undo'):
         contents.read_scene(scene(), depsgraph())
     scene().collection.objects.link(asset)
     assert len(read()[0]) == 5

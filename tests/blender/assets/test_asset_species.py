@@ -12,6 +12,7 @@ from tests.blender.assets.scatters import crown, read, scene, species
 from tests.blender.scenes import add_mesh, add_plant, depsgraph, select
 from tetflora_addon.blender.assets import marks
 from tetflora_addon.blender.compat import shader_tree
+from tetflora_addon.blender.job import refine
 from tetflora_addon.blender.placing.distances import distance_of
 from tetflora_addon.blender.placing.plant_objects import add_plant as place_plant
 from tetflora_addon.blender.scene.crowns import crown_for, crown_to_draw
@@ -256,6 +257,26 @@ def test_a_missing_asset_is_shown_as_such_in_menus():
     assert item[1] == "Rock (missing)" and item[3] == 'ERROR'
     with pytest.raises(RuntimeError, match='"Rock", which was used as a species, was deleted'):
         bpy.ops.tetflora.populate()
+
+
+def test_a_model_that_was_deleted_is_missing_although_results_show_it_still():
+    """Instances of results are users of it, too: it was made again and again, and listed as if it were there."""
+    obj = crown("Rock")
+    own = species(obj)
+    for number in range(3):
+        add_plant(str(number), own, location=(4.0 * number, 0.0, 0.0))
+    scene().camera = bpy.data.objects.new("camera", bpy.data.cameras.new("camera"))
+    scene().camera.location, scene().camera.rotation_euler = (4.0, -40.0, 3.0), (1.5, 0.0, 0.0)
+    scene().collection.objects.link(scene().camera)
+    assert refine.refine(scene(), depsgraph()).instances_whole == 3
+    edits.look_again()
+    assert edits.catalog()[own].name == "Rock"
+    select(obj)
+    bpy.ops.object.delete()
+    edits.look_again()
+    assert own not in edits.catalog() and obj.users > 0
+    with pytest.raises(SceneError, match='"Rock", which was used as their species, was deleted'):
+        refine.refine(scene(), depsgraph())
 
 
 def test_species_are_saved_and_belong_to_their_file(tmp_path):

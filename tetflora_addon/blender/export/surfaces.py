@@ -234,9 +234,7 @@ def _material_of(scene: bpy.types.Scene, look: _Look) -> tuple[bpy.types.Materia
     if any(other != found for other in every):
         problems.append(f'{look.name} has several materials; "{found.name}" stands for all')
     if tree_in_use(found) is None:
-        problems.append(
-            f'Material "{found.name}" has no nodes, and its viewport color stands for it; turn on Use Nodes'
-        )
+        problems.append(f'Material "{found.name}" has no nodes, and its viewport color stands in; turn on Use Nodes')
     return found, problems
 
 

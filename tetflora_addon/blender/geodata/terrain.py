@@ -86,9 +86,7 @@ def read_raster(order: Import, path: Path | None = None) -> Job[Raster]:
             raise SceneError(f"{what}none of its cells has a value")
         tiles.append(raster)
         if sum(tile.values.size for tile in tiles) > 2 * MAX_CELLS:
-            raise SceneError(
-                f"{what}with the {len(tiles) - 1:,} before it, more than {MAX_CELLS:,} cells; import fewer"
-            )
+            raise SceneError(f"{what}with the {len(tiles) - 1:,} before it, over {MAX_CELLS:,} cells; import fewer")
     raster = yield from call_in_thread(Progress(0.5, "Joining tiles"), mosaic, tiles, [path.name for path in paths])
     if paths[0] == order.path and (box := order.box(raster.outline, raster.system)) is not None:
         raster = raster.part(raster.cells(box.corners))

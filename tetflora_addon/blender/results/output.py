@@ -12,6 +12,7 @@ from typing import Any
 
 import bpy
 
+from ..declare import PURPOSE
 from ..materials.nodes import MADE, is_ours, is_own, tag, untag
 from ..runtime import is_there
 from ..scene.looks import wear
@@ -26,8 +27,6 @@ PARENT = "species"
 STAND_IN = "stand-in"
 #: Custom property of a result object: the object or collection that TetFlora made for it to show instances of.
 SOURCE = "tetflora_source"
-#: Custom property of a result collection: 'VIEW' for the artist's results, 'RENDER' for those of a running render.
-PURPOSE = "tetflora_purpose"
 #: Megabytes that the objects of a result collection take in Blender.
 MEGABYTES = "tetflora_megabytes"
 _KEPT = "tetflora_kept"  # on materials that a file holds although it does not hold the results that use them

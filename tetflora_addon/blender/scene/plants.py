@@ -338,7 +338,7 @@ def _unknown(odd: list[tuple[str, str]]) -> str:
     if species.startswith(PREFIX):
         gone = "the object or collection that was their species is not used as one; click Use as Species on it again"
         if find_asset(None, species) is not None:
-            gone = f'"{name_of(species)}", which was used as their species, was deleted; undo that'
+            gone = f'"{name_of(species)}", which was used as their species, was deleted; undo'
         return f"{names}: {gone}, or choose another species in the TetFlora tab of the sidebar"
     more, file = len({other for _, other in odd}) - 1, f"{species}.json" if species else "its file"
     told = f'{names}: unknown species "{species}"{f" and {more} more" if more else ""}; choose another'

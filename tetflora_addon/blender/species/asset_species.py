@@ -24,7 +24,8 @@ from ...arrays import Floats, linear_of
 from ...errors import NAME, SpeciesError, readable
 from ...files import is_identifier
 from ...species.catalog import FileInfo
-from ..declare import boolean, pointer_to, real, string
+from ..compat import node_inputs
+from ..declare import PURPOSE, boolean, pointer_to, real, string
 
 #: What identifiers of assets begin with.
 PREFIX = "asset-"
@@ -77,7 +78,7 @@ def find_asset(scene: bpy.types.Scene | None, identifier: str) -> TetFloraAssetS
     return next((entry for entry in entries_of(scene) if entry.identifier == identifier), None)
 
 
-def datablock_of(entry: TetFloraAssetSpecies, references: Counter[bpy.types.Object] | None = None) -> Datablock | None:
+def datablock_of(entry: TetFloraAssetSpecies, references: Counter[object] | None = None) -> Datablock | None:
     """What stands for plants of an asset species; None where it was deleted, though these lists keep it in the file."""
     if entry.object is None or entry.id_data.library is not None:
         return entry.object or entry.collection
@@ -85,9 +86,11 @@ def datablock_of(entry: TetFloraAssetSpecies, references: Counter[bpy.types.Obje
     return entry.object if entry.object.users > references[entry.object] else None
 
 
-def _references() -> Counter[bpy.types.Object]:
-    """How many entries of the file refer to each object."""
-    return Counter(entry.object for entry in entries_of())
+def _references() -> Counter[object]:
+    """How often entries of the file, and results that show instances, refer to each object."""
+    named = [entry.object for entry in entries_of()]
+    results = (o for home in (bpy.data.collections if named else ()) if PURPOSE in home for o in home.objects)
+    return Counter(named + [value for o in results for modifier in o.modifiers for value in node_inputs(modifier)])
 
 
 def asset_species(scene: bpy.types.Scene | None = None) -> dict[str, TetFloraAssetSpecies]:
@@ -147,9 +150,7 @@ def refuse_asset(scene: bpy.types.Scene | None, identifier: str) -> None:
     if entry is not None:
         name = readable(name_of(identifier), NAME)
         if datablock_of(entry) is None:
-            raise SpeciesError(
-                f'"{name}", which was used as a species, was deleted; undo that, or choose another species'
-            )
+            raise SpeciesError(f'"{name}", which was used as a species, was deleted; undo, or choose another species')
         raise SpeciesError(f'"{name}" is an asset: it does not grow, and there is nothing to change in it here')
 
 

@@ -343,7 +343,7 @@ def unknown_text(identifier: str) -> str:
     """What is said of an identifier that the catalog does not have: which asset is gone, or what there is."""
     if find_asset(None, identifier) is not None:
         name = readable(name_of(identifier), NAME)
-        return f'"{name}", which was used as a species, was deleted; undo that, or choose another species'
+        return f'"{name}", which was used as a species, was deleted; undo, or choose another species'
     return f'Unknown species "{readable(identifier, NAME)}"; choose one of {", ".join(catalog())}'
 
 
