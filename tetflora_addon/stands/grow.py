@@ -238,9 +238,7 @@ def grown(
         Of all plants.
     """
     one = plants.take(block)
-    x, y, radius, base, height = (
-        value[block] for value in (crowns.x, crowns.y, crowns.radius, crowns.base, crowns.height)
-    )
+    x, y, radius, base, height = (v[block] for v in (crowns.x, crowns.y, crowns.radius, crowns.base, crowns.height))
     species, taken = one.species, taken[block]
 
     def own(values: NDArray) -> NDArray:
@@ -320,10 +318,11 @@ def dying(one: Plants, traits: StandTraits, year: int) -> Mask:
     return (uniform(child_key(one.key, year), StandDraw.DEATH) < chance) | (one.age > old * lifespan)
 
 
-def fallen(plants: Plants, last: Records, slope: tuple[NDArray, NDArray], cells: NDArray, year: float) -> DeadPlants:
-    """What is left of plants that die in a year: trees that stand dead, and will fall, rather down the slope."""
+def fallen(plants: Plants, last: Records, site: StandSite, slope: tuple[NDArray, NDArray], year: float) -> DeadPlants:
+    """What is left of plants that die in a year: trees that stand dead, and will fall down the slope, onto ground."""
     kept = np.flatnonzero((last.diameter >= _KEPT_DIAMETER) & (last.height >= _KEPT_HEIGHT))
-    plants, last, cells = plants.take(kept), last.take(kept), cells[kept]
+    plants, last = plants.take(kept), last.take(kept)
+    cells = site.cells(plants.x, plants.y)
     lasts = np.sqrt(last.diameter.astype(np.float64) / _DEAD_DIAMETER)
     stands = np.floor((_STANDS[0] + (_STANDS[1] - _STANDS[0]) * uniform(plants.key, StandDraw.FALL) ** 2) * lasts) + 1.0
     lies = np.floor((_LIES[0] + (_LIES[1] - _LIES[0]) * uniform(plants.key, StandDraw.LIE)) * lasts) + 1.0
@@ -333,8 +332,10 @@ def fallen(plants: Plants, last: Records, slope: tuple[NDArray, NDArray], cells:
     along = 1.0 - np.abs(((4.0 * turn - 2.0) % 2.0) - 1.0) * 2.0
     across = np.where(turn < 0.5, 1.0, -1.0) * (1.0 - np.abs(along))
     east, north = across - 3.0 * slope[0][cells], along - 3.0 * slope[1][cells]
-    length = np.maximum(np.sqrt(east**2 + north**2), 1e-6)
-    lean = (1.05 * LYING * np.stack([east / length, north / length], axis=1)).astype(np.float32)
+    way = np.stack([east, north]) / np.maximum(np.sqrt(east**2 + north**2), 1e-6)
+    foot, reach = np.stack([plants.x, plants.y]), way * last.height
+    back = ~site.holds(*(foot + reach)) & site.holds(*(foot - reach))
+    lean = (1.05 * LYING * np.where(back, -way, way).T).astype(np.float32)
     return DeadPlants(last, np.full(len(kept), float(year)), year + stands, year + stands + lies, lean)
 
 
@@ -621,10 +622,7 @@ class GrowingStand:
         self.plants = Plants.concatenate([plants, new])
         self.count += len(new)
         if sum(map(len, self.kept)) > MOST_RECORDS:
-            raise TetFloraError(
-                f"The stand has more than {MOST_RECORDS:,} records; raise Interval or Min Height, or choose a smaller "
-                "ground"
-            )
+            raise TetFloraError(f"Over {MOST_RECORDS:,} records; raise Interval or Min Height, or use a smaller ground")
         if len(self.plants) > MOST_PLANTS:
             raise TetFloraError(f"The stand has over {MOST_PLANTS:,} plants; lower Seedlings, or use a smaller ground")
 
@@ -647,8 +645,7 @@ class GrowingStand:
             self.kept.append(last.take(np.flatnonzero(plants.known)))
         tall = np.flatnonzero(plants.height >= self.settings.min_height)
         plants, last = plants.take(tall), last.take(tall)
-        cells = self.site.cells(plants.x, plants.y)
-        self.dead = DeadPlants.concatenate([self.dead, fallen(plants, last, self.slope, cells, year)])
+        self.dead = DeadPlants.concatenate([self.dead, fallen(plants, last, self.site, self.slope, year)])
 
     def _decay(self, year: int, record: bool) -> None:
         """Dead trees: some fall, some are gone."""
@@ -669,9 +666,7 @@ class GrowingStand:
         if not len(first):
             return first
         # A dead tree that falls in the last year is recorded twice: the same row.
-        again = np.flatnonzero(
-            np.append(True, (first.plant[1:] != first.plant[:-1]) | (first.year[1:] != first.year[:-1]))
-        )
-        first = first.take(again)
-        new = np.append(True, first.plant[1:] != first.plant[:-1])
+        other = np.append(True, (np.diff(first.plant) != 0) | (np.diff(first.year) != 0))
+        first = first.take(np.flatnonzero(other))
+        new = np.append(True, np.diff(first.plant) != 0)
         return replace(first, plant=(np.cumsum(new) - 1).astype(np.int32))

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..arrays import Floats, Integers, bilinear
+from ..arrays import Floats, Integers, Mask, bilinear
 from ..errors import TetFloraError
 from ..species.ages import ages_of
 from ..species.ecology import ecology_of
@@ -91,6 +91,11 @@ class StandSite:
         rows, columns = self.height.shape
         column = np.clip((np.asarray(x) / self.cell).astype(np.intp), 0, columns - 1)
         return np.clip((np.asarray(y) / self.cell).astype(np.intp), 0, rows - 1) * columns + column
+
+    def holds(self, x: NDArray, y: NDArray) -> Mask:
+        """Whether plants can be (n,) at places (n,) in meters from the corner."""
+        inside = (x >= 0.0) & (y >= 0.0) & (x < self.size[0]) & (y < self.size[1])
+        return inside & (_of(self.plantable, 1.0, self.height).ravel()[self.cells(x, y)] > 0.0)
 
     def ground(self, x: NDArray, y: NDArray) -> Floats:
         """Altitude (n,) at places (n,) in meters from the corner, bilinear between the middles of cells."""

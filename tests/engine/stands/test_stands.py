@@ -155,6 +155,16 @@ def test_thin_dead_trees_break_as_they_fall() -> None:
     assert rows.diameter[rows.lying].min() >= 0.1 > rows.diameter[rows.dead > 0].min()
 
 
+def test_dead_trees_fall_onto_the_ground() -> None:
+    """Not across its border, where their tips hung in the air, but where there is room on neither side."""
+    site, rows = half_planted(), records()
+    lying = rows.take(np.flatnonzero(rows.lying))
+    way = lying.lean / np.linalg.norm(lying.lean, axis=1)[:, None] * lying.height[:, None]
+    foot = lying.position[:, :2] - (site.west, site.south)
+    there, other = site.holds(*(foot + way).T), site.holds(*(foot - way).T)
+    assert there.mean() > 0.75 and not (other & ~there).any()
+
+
 def test_saplings_in_the_shade_have_crowns() -> None:
     """Of three tenths of their height at least: rods without leaves had been left of some."""
     last = records().at(60.0)
