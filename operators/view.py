@@ -24,6 +24,7 @@ _OURS = "tetflora_daylight"  # on the sun and the world that Daylight made
 _STARTUP_LAMP = 4.07625, 1.00545, 5.90386  # where Blender's startup file has its lamp
 _LENS = 28.0  # millimeters, of a camera that is made
 _TILT = radians(32.0)  # from above
+_AHEAD = 60.0  # meters of ground ahead of a camera at eye height, where there is so much
 _SUMMER = 196.0  # day of the year without seasons
 
 
@@ -111,6 +112,11 @@ def _at_eye_height(scene: bpy.types.Scene, ground: Ground, view: Matrix) -> Matr
     if not near and (middle - stand).xy.length > 0.2 * (corners.max(axis=0) - corners.min(axis=0))[:2].max():
         flat = Vector(((middle - stand).x, (middle - stand).y, 0.0)).normalized()  # not out over the edge of the ground
     up = Vector((0.0, 0.0, EYE_HEIGHT))
+    if not near:  # a small ground lies ahead as a whole
+        along = corners @ np.array(flat)
+        back = max(float(min(_AHEAD, 0.85 * np.ptp(along)) - along.max()) + stand.dot(flat), 0.0)
+        places = (stand + up - part * back * flat for part in (1.0, 0.75, 0.5, 0.25))
+        stand = next((place for place in places if _on_ground(ground, place) != place), stand)
     place = Vector(open_place(scene, np.array(_on_ground(ground, stand) + up), np.array(flat)))
     eye = _on_ground(ground, place - up) + up
     turn = (flat + Vector((0.0, 0.0, 0.06))).to_track_quat('-Z', 'Y')

@@ -233,12 +233,12 @@ def draw_distance(layout: bpy.types.UILayout, settings: bpy.types.PropertyGroup)
 
 
 def _draw_stand(layout: bpy.types.UILayout, field: bpy.types.Object) -> None:
-    """The slider through the years of a stand, and what it grows from."""
+    """The year of a stand, and what it grows from."""
     stand = field.tetflora.stand
     if has_history(field):
         last = stand.last_year
         text = f"Year of {last:g}" if last else "Year"
-        layout.prop(field.tetflora, "stand_year", text=text, slider=True)
+        layout.prop(field.tetflora, "stand_year", text=text)
         row = layout.row(align=True)
         base.Button("animate_growth", 'KEYFRAME').draw(row)
         base.Button("keep_year", 'PINNED').draw(row)

@@ -62,9 +62,7 @@ def read_tiff(path: Path) -> Job[Raster]:
         # Refuse what has several values in a pixel; a second one may be what counts.
         bands = tags.one("SamplesPerPixel", 1)
         if bands != 1 and not (bands == 2 and tags.numbers("ExtraSamples")[:1] in ((1,), (2,))):
-            raise tags.broken(
-                "SamplesPerPixel", f"is {bands}; write one band only, for example with gdal_translate -b 1"
-            )
+            raise tags.broken("SamplesPerPixel", f"is {bands}; write one band, for example with gdal_translate -b 1")
         (place, system), notes = _place(path, tags), []
         values, absent = yield from tags.pixels()
         absent |= ~(yield from tags.mask(values.shape))

@@ -230,9 +230,7 @@ def leaf_model(positions: ArrayLike, faces: list[list[int]], uv: ArrayLike | Non
         raise SpeciesError(f"leaf model: must have at most {MAX_LEAF_CORNERS} vertices and face corners")
     named = [v for f in faces for v in f]
     if wrong := [v for v in named if not 0 <= v < len(positions)]:
-        raise SpeciesError(
-            f"leaf model: faces refer to vertex {wrong[0]}, but the vertices are 0 to {len(positions) - 1}"
-        )
+        raise SpeciesError(f"leaf model: faces refer to vertex {wrong[0]}, but vertices are 0 to {len(positions) - 1}")
     if any(len(set(f)) < len(f) for f in faces):
         raise SpeciesError("leaf model: a face uses a vertex twice")
     offsets = np.concatenate([[0], np.cumsum(sizes)]).astype(np.int32)

@@ -303,6 +303,18 @@ def test_a_camera_comes_to_the_ground_and_looks_at_it(where):
     assert "crown" not in _keys() and "clip" not in _keys()
 
 
+@pytest.mark.parametrize(("size", "ahead"), [(40.0, 30.0), (400.0, 55.0)])
+def test_ground_lies_ahead_of_a_camera_at_eye_height(size, ahead):
+    """On forty meters it stood in the middle, and saw little but the edge."""
+    add_mesh("ground", size=size)
+    bpy.ops.tetflora.look()
+    bpy.context.view_layer.update()
+    camera = bpy.context.scene.camera.matrix_world
+    place, direction = camera.translation.xy, -camera.to_3x3().col[2].xy.normalized()
+    assert max(map(abs, place)) <= size / 2.0
+    assert max(map(abs, place + ahead * direction)) <= size / 2.0
+
+
 @pytest.mark.parametrize("move", [bpy.ops.tetflora.look, lambda: warnings.mend(bpy.context.scene, "crown")])
 def test_a_camera_at_eye_height_does_not_look_at_a_trunk(move):
     """In a beech forest a trunk two meters ahead filled four fifths of the picture."""

@@ -121,9 +121,7 @@ def check_buffers(buffers: MeshBuffers) -> None:
     ):
         array = getattr(buffers, key)
         if array.shape != shape or array.dtype != dtype:
-            raise ValueError(
-                f"{key} must be {np.dtype(dtype)} of shape {shape}, not {array.dtype} of shape {array.shape}"
-            )
+            raise ValueError(f"{key} must be {np.dtype(dtype)} of shape {shape}, not {array.dtype} of {array.shape}")
     offsets = buffers.face_offsets
     if faces < 0 or offsets[0] != 0 or offsets[-1] != corners or (faces and np.diff(offsets).min() < 3):
         raise ValueError(f"face_offsets must rise from 0 to {corners} corners in steps of at least 3")
@@ -136,9 +134,7 @@ def check_buffers(buffers: MeshBuffers) -> None:
         if domain not in _DOMAINS:
             raise ValueError(f"Attribute {key}: domain must be one of {', '.join(_DOMAINS)}, not {domain!r}")
         if type_for(values) is None:
-            raise ValueError(
-                f"Attribute {key}: Blender has no attribute type for {values.dtype} of shape {values.shape}"
-            )
+            raise ValueError(f"Attribute {key}: Blender has no type for {values.dtype} of shape {values.shape}")
         if len(values) != sizes[domain]:
             raise ValueError(f"Attribute {key}: has {len(values)} values, but {domain} has {sizes[domain]} elements")
         if key == UV_MAP and (domain != "CORNER" or values.shape[1:] != (2,)):
