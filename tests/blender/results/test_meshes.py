@@ -158,7 +158,7 @@ def test_a_mesh_of_an_artist():
         ({"face_offsets": np.array([0, 2, 6, 10, 14, 18], np.int32)}, "face_offsets must rise"),
         ({"attributes": {"a": ("FACE", np.zeros(4, np.float32))}}, "has 4 values, but FACE has 5 elements"),
         ({"attributes": {"a": ("EDGE", np.zeros(9, np.float32))}}, "domain must be one of"),
-        ({"attributes": {"a": ("FACE", np.zeros(5))}}, "no attribute type for float64"),
+        ({"attributes": {"a": ("FACE", np.zeros(5))}}, "no type for float64"),
         ({"attributes": {"UVMap": ("FACE", np.zeros((5, 2), np.float32))}}, "on CORNER"),
     ],
 )
