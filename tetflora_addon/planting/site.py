@@ -190,7 +190,7 @@ class Site:
             triangles, normal, chosen, weight = _kept(weight.max(axis=1) > 0.0, triangles, normal, chosen, weight)
             if not len(chosen):
                 raise SceneError(
-                    "The vertex group has no weight within slope limits; paint some, or invert or clear it"
+                    "The vertex group has no weight within the slope limits; paint some, or invert or clear it"
                 )
         low, high = triangles[..., 2].min(axis=1), triangles[..., 2].max(axis=1)
         at_altitude = (high >= rules.altitude_min) & (low <= rules.altitude_max)

@@ -319,7 +319,7 @@ def dying(one: Plants, traits: StandTraits, year: int) -> Mask:
 
 
 def fallen(plants: Plants, last: Records, site: StandSite, slope: tuple[NDArray, NDArray], year: float) -> DeadPlants:
-    """What is left of plants that die in a year: trees that stand dead, and will fall down the slope, onto ground."""
+    """What is left of plants that die in a year: trees that stand dead, and fall rather down the slope, onto ground."""
     kept = np.flatnonzero((last.diameter >= _KEPT_DIAMETER) & (last.height >= _KEPT_HEIGHT))
     plants, last = plants.take(kept), last.take(kept)
     cells = site.cells(plants.x, plants.y)
@@ -622,7 +622,8 @@ class GrowingStand:
         self.plants = Plants.concatenate([plants, new])
         self.count += len(new)
         if sum(map(len, self.kept)) > MOST_RECORDS:
-            raise TetFloraError(f"Over {MOST_RECORDS:,} records; raise Interval or Min Height, or use a smaller ground")
+            remedy = "raise Interval or Min Height, or use a smaller ground"
+            raise TetFloraError(f"The stand has over {MOST_RECORDS:,} records; {remedy}")
         if len(self.plants) > MOST_PLANTS:
             raise TetFloraError(f"The stand has over {MOST_PLANTS:,} plants; lower Seedlings, or use a smaller ground")
 
@@ -666,7 +667,6 @@ class GrowingStand:
         if not len(first):
             return first
         # A dead tree that falls in the last year is recorded twice: the same row.
-        other = np.append(True, (np.diff(first.plant) != 0) | (np.diff(first.year) != 0))
-        first = first.take(np.flatnonzero(other))
+        first = first.take(np.flatnonzero(np.append(True, (np.diff(first.plant) != 0) | (np.diff(first.year) != 0))))
         new = np.append(True, np.diff(first.plant) != 0)
         return replace(first, plant=(np.cumsum(new) - 1).astype(np.int32))
