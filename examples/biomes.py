@@ -100,7 +100,9 @@ _COOL, _GOLD = (1.0, 0.95, 0.88), (1.0, 0.86, 0.66)
 _CLEAR = (0.0002, (0.4, 0.5, 0.5))
 VIEWS = {
     "alpine_treeline": View((-34.0, -26.0, 1.8), (18.0, 2.0, 3.0), 24.0, (38.0, 215.0), gray=0.42, clouds=0.6),
-    "beech_fern": View((0.0, -40.0, 1.6), (0.0, 0.0, 3.5), 26.0, (56.0, 215.0), gray=0.42, haze=_CLEAR, light=2.2),
+    "beech_fern": View(
+        (-7.0, 1.5, 1.6), (10.0, 35.0, 2.6), 26.0, (56.0, 215.0), gray=0.46, haze=_CLEAR, light=2.2, free=0.0
+    ),
     "birch_pine": View((0.0, -42.0, 1.6), (4.0, 0.0, 4.6), 26.0, (36.0, 240.0), _GOLD, gray=0.38),
     "dead_forest": View((0.0, -42.0, 1.6), (-3.0, 0.0, 4.5), 26.0, (32.0, 245.0), gray=0.38, clouds=0.8),
     "hedgerow": View((-45.0, -12.0, 1.75), (0.0, 1.0, 2.4), 28.0, (34.0, 200.0), _COOL, gray=0.42, beside="meadow"),
@@ -121,7 +123,7 @@ VIEWS = {
         water=0.3,
     ),
     "spruce_forest": View(
-        (0.0, -40.0, 1.6), (0.0, 0.0, 3.8), 26.0, (54.0, 215.0), gray=0.4, haze=_CLEAR, light=2.2, free=5.0
+        (-25.0, -17.0, 1.6), (5.0, 10.0, 3.0), 26.0, (54.0, 215.0), gray=0.44, haze=_CLEAR, light=2.2, free=0.0
     ),
     "tropical_understory": View(
         (0.0, -38.0, 1.6),
@@ -324,7 +326,7 @@ def dress(scene: bpy.types.Scene, view: View, camera: str, season: str) -> float
     high, tint = (min(view.sun[0], WINTER_SUN), look.tint) if snowy else (view.sun[0], view.tint)
     stage.sun(scene, high, view.sun[1] - 180.0, 5.0 * light, tint, 0.8)
     scene.world = sky(replace(look, clouds=view.clouds, strength=look.strength * light))
-    add_haze(scene, *view.haze)
+    add_haze(scene, *(view.haze if eye else _CLEAR))
     return look.gray if snowy else view.gray if eye else ABOVE_GRAY
 
 

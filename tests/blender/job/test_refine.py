@@ -316,7 +316,7 @@ def test_materials_show_the_colors_of_their_species_in_solid_viewports():
     shown = {o.data.materials[0].name: tuple(o.data.materials[0].diffuse_color) for o in _made(scene)}
     leaves = [color for name, color in shown.items() if name.endswith("leaf")]
     assert len(leaves) == len(set(leaves)) == 3
-    blossom, leaf = (next(color for name, color in shown.items() if f"in blossom {of}" in name) for of in ("b", "leaf"))
+    blossom, leaf = (next(color for name, color in shown.items() if f"cherry {of}" in name) for of in ("b", "leaf"))
     assert blossom[0] > blossom[1] and leaf[1] > leaf[0]  # pink, and green
     material = next(o.data.materials[0] for o in _made(scene) if o["tetflora_kind"] == "bark")
     material.diffuse_color = (0.0, 0.0, 1.0, 1.0)
