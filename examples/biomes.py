@@ -141,7 +141,7 @@ EYE, FROM_ABOVE = CAMERAS = "Eye", "From Above"
 WINTER_SUN = 16.0
 #: From where most of the hectare is seen from above, without its border, as `View.eye` and `View.ahead`, the lens and
 #: the exposure's mean.
-ABOVE, BELOW, ABOVE_LENS, ABOVE_GRAY = (0.0, -95.0, 105.0), (0.0, 0.0, 0.0), 64.0, 0.4
+ABOVE, BELOW, ABOVE_LENS, ABOVE_GRAY = (0.0, -95.0, 105.0), (0.0, 0.0, 0.0), 64.0, 0.37
 
 
 #: The picture of the README: the wood of birches and pines against a low sun.
@@ -326,7 +326,8 @@ def dress(scene: bpy.types.Scene, view: View, camera: str, season: str) -> float
     high, tint = (min(view.sun[0], WINTER_SUN), look.tint) if snowy else (view.sun[0], view.tint)
     stage.sun(scene, high, view.sun[1] - 180.0, 5.0 * light, tint, 0.8)
     scene.world = sky(replace(look, clouds=view.clouds, strength=look.strength * light))
-    add_haze(scene, *(view.haze if eye else _CLEAR))
+    if eye:  # crowns from above are dark: the air before them would be half of what is seen
+        add_haze(scene, *view.haze)
     return look.gray if snowy else view.gray if eye else ABOVE_GRAY
 
 
