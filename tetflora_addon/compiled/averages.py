@@ -28,7 +28,7 @@ from ..growth.foliage import YOUTH
 from ..growth.rows import DEAD, FORK, LATERAL, NOW, SPUR, fullness_of, lengths, living, spread_children
 from ..growth.seeds import BASE, LEAVES, MOST, WIDTH, Branches
 from ..leaves.levels import hidden_gloss
-from ..leaves.models import LeafModel
+from ..leaves.models import Forms, LeafModel
 from ..species.members import dead_vigor, expected_forks
 from ..species.species import EVEN, LEAF_KINDS, Range, Species
 
@@ -81,7 +81,7 @@ def tube_perimeter(sides: Integers) -> Floats:
     return 2 * sides * np.sin(np.pi / sides)
 
 
-def row_leaves(rows: Table, forms: Sequence[Sequence[Sequence[LeafModel]]], transmission: NDArray) -> RowLeaves:
+def row_leaves(rows: Table, forms: Sequence[Forms], transmission: NDArray) -> RowLeaves:
     """Means over the forms of leaves of species and kinds; ``transmission`` is (species, kinds)."""
     kind = rows["species"], rows["leaf_kind"]
 

@@ -288,12 +288,12 @@ def compile_species(species: Sequence[Species]) -> Flora:
 @lru_cache(maxsize=8)
 def _compiled(species: tuple[Species, ...]) -> Flora:
     for one in species:
-        for kind, name in enumerate(LEAF_KINDS):
+        for kind in LEAF_KINDS:
             for form in one.forms(kind):
                 if not isinstance(form, LeafModel):
-                    raise SpeciesError(f'{one.identifier}: the {name} object "{form}" was not replaced with a mesh')
+                    raise SpeciesError(f'{one.identifier}: the {kind} object "{form}" was not replaced with a mesh')
     rows = build_rows(species)
-    forms = tuple(tuple(one.forms(kind) for kind in range(len(LEAF_KINDS))) for one in species)
+    forms = tuple(tuple(one.forms(kind) for kind in LEAF_KINDS) for one in species)
     leaf = row_leaves(rows, forms, np.array([[one.leaf_transmission, one.blossom_transmission] for one in species]))
     totals = average(rows, leaf)
     bound = _with_drawn(rows, unit_bounds(rows))
@@ -344,14 +344,8 @@ def _windy(flora: Flora, wind: Wind) -> Flora:
     totals = flora.averages
     rows = windy_rows(flora.rows, totals.length, totals.radius, wind)
     bound = _with_drawn(rows, unit_bounds(rows))
-    return replace(
-        flora,
-        rows=rows,
-        bound=bound,
-        widest=widest_radii(rows),
-        leaf_reach=leaf_reaches(rows, bound, flora.leaf.reach),
-        calm=flora,
-    )
+    reach = leaf_reaches(rows, bound, flora.leaf.reach)
+    return replace(flora, rows=rows, bound=bound, widest=widest_radii(rows), leaf_reach=reach, calm=flora)
 
 
 def _with_drawn(rows: Table, bound: Floats) -> Floats:

@@ -15,7 +15,6 @@ from ..leaves.models import LeafModel
 from .species import (
     CROWN_PROFILES,
     EVEN,
-    LEAF_KINDS,
     Dead,
     Order,
     Range,
@@ -163,5 +162,5 @@ def dead_vigor(fraction: Floats) -> Floats:
 
 def leaf_polygons(species: Species, order: Order) -> float:
     """Mean polygons of the leaves that branches of an order bear."""
-    forms = species.forms(LEAF_KINDS.index(order.leaf_kind)) or species.leaf
+    forms = species.forms(order.leaf_kind) or species.leaf
     return float(np.mean([form.polygons if isinstance(form, LeafModel) else 1 for form in forms]))
