@@ -15,7 +15,7 @@ from bpy.types import Collection, Depsgraph, Mesh, Object, Scene
 from mathutils import Matrix, Quaternion
 from numpy.typing import NDArray
 
-from ...arrays import Floats, Integers32, Mask, quaternions
+from ...arrays import Floats, Mask, quaternions
 from ...errors import SceneError
 from ...jobs import run_to_end
 from ...planting.places import Placement, new_seeds
@@ -38,6 +38,8 @@ PAINTED_MARK = "tetflora_painted"  # on the field that painted plants go to
 _MARK = "tetflora_plants"  # on the collection, so that it may be renamed
 _BATCH = 300  # empties of one step, ten milliseconds
 _FEW = 1000  # plants that may get their names the way Blender does it
+#: Where plants go; None for the scene's collection for plants.
+Home = Collection | None
 
 
 def plants_of(objects: Iterable[Object]) -> list[Object]:
@@ -82,11 +84,7 @@ def add_plant(
 
 
 def add_plants_steps(
-    scene: Scene,
-    placement: Placement,
-    species: Sequence[str],
-    collection: Collection | None = None,
-    ages: np.ndarray | None = None,
+    scene: Scene, placement: Placement, species: Sequence[str], collection: Home = None, ages: Floats | None = None
 ) -> Generator[list[Object], object, list[Object]]:
     """Make the empties of a placement.
 
@@ -124,8 +122,8 @@ def _empties_steps(
     rows: Sequence[np.ndarray],
     species: Sequence[str],
     forms: Sequence[Object | None],
-    collection: Collection | None = None,
-    ages: np.ndarray | None = None,
+    collection: Home = None,
+    ages: Floats | None = None,
 ) -> Generator[list[Object], object, list[Object]]:
     """One empty for each row of places, XYZ Euler angles, scales, numbers of kinds and seeds."""
     known = catalog()
@@ -166,12 +164,8 @@ def _set_at_once(objects: Sequence[Object], rows: Sequence[np.ndarray], heights:
     within = bpy.data.collections.new(COLLECTION)
     for obj in objects:
         within.objects.link(obj)
-    for name, values in (
-        ("location", position),
-        ("rotation_euler", angles),
-        ("scale", np.repeat(scale, 3)),
-        ("empty_display_size", heights),
-    ):
+    names = ("location", "rotation_euler", "scale", "empty_display_size")
+    for name, values in zip(names, (position, angles, np.repeat(scale, 3), heights), strict=True):
         within.objects.foreach_set(name, np.ascontiguousarray(values, dtype=np.float32).reshape(-1))
     within.objects.foreach_set("empty_display_type", np.full(len(objects), arrow, np.int32))
     bpy.data.collections.remove(within)
@@ -191,11 +185,7 @@ def _numbered(names: Sequence[str], kinds: np.ndarray) -> list[str]:
 
 
 def add_field(
-    scene: Scene,
-    placement: Placement,
-    species: Sequence[str],
-    collection: Collection | None = None,
-    ages: np.ndarray | None = None,
+    scene: Scene, placement: Placement, species: Sequence[str], collection: Home = None, ages: Floats | None = None
 ) -> Object:
     """Make one field of the plants of a placement.
 
@@ -212,9 +202,7 @@ def add_field(
     return link_field(scene, fields.write_field(FIELD, *rows, species, ages=ages), collection)
 
 
-def field_from_plants(
-    scene: Scene, depsgraph: Depsgraph, plants: Iterable[Object], collection: Collection | None = None
-) -> Object:
+def field_from_plants(scene: Scene, depsgraph: Depsgraph, plants: Iterable[Object], collection: Home = None) -> Object:
     """Put a field in place of plants that are objects; the same individuals stand at the same places.
 
     Parameters
@@ -238,7 +226,7 @@ def field_from_plants(
 
 
 def plants_from_field(
-    scene: Scene, depsgraph: Depsgraph, field: Object, most: int, collection: Collection | None = None
+    scene: Scene, depsgraph: Depsgraph, field: Object, most: int, collection: Home = None
 ) -> list[Object]:
     """Put empties in place of a field; the same individuals stand at the same places.
 
@@ -293,7 +281,7 @@ def remove_fields(objects: Iterable[Object], tidy: bool = True) -> int:
     return number
 
 
-def link_field(scene: Scene, field: Object, collection: Collection | None = None) -> Object:
+def link_field(scene: Scene, field: Object, collection: Home = None) -> Object:
     """Put a field that TetFlora made into a collection; the scene's for plants if not given."""
     field.tetflora.version, field[FIELD_MARK] = VERSION, True
     (collection or plant_collection(scene)).objects.link(field)
@@ -405,26 +393,15 @@ def take_points(obj: Object, keep: Mask) -> None:
     _write(obj, points, int(keep.sum()))
 
 
-def add_points(
-    obj: Object,
-    position: Floats,
-    frame: Floats,
-    scale: Floats,
-    kinds: Integers32,
-    seed: Integers32,
-    species: Sequence[str],
-) -> None:
-    """Add plants to a field, at the end; other attributes of theirs are zero.
+def add_points(obj: Object, placement: Placement, species: Sequence[str]) -> None:
+    """Add upright plants to a field, at the end; other attributes of theirs are zero.
 
     Parameters
     ----------
     obj : bpy.types.Object
         `editable`.
-    position, frame, scale : (n, 3), (n, 3, 3), (n,) float64
-        In world space.
-    kinds : (n,) int32
-        Index into ``species``.
-    seed : (n,) int32
+    placement : Placement
+        In world space; its species are an index into ``species``.
     species : sequence of str
         Identifiers; those that the field's list lacks are added to it.
     """
@@ -437,12 +414,14 @@ def add_points(
     world = np.array(obj.matrix_world, dtype=np.float64)
     size = float(np.cbrt(abs(np.linalg.det(world[:3, :3]))))
     turn = np.array(obj.matrix_world.to_3x3().normalized(), dtype=np.float64)
+    c, s, none = np.cos(placement.azimuth), np.sin(placement.azimuth), np.zeros(len(placement))
+    frame = np.stack([c, -s, none, s, c, none, none, none, none + 1.0], axis=1).reshape(-1, 3, 3)
     own = {
-        "position": (position - world[:3, 3]) @ np.linalg.inv(world[:3, :3]).T,
+        "position": (placement.position - world[:3, 3]) @ np.linalg.inv(world[:3, :3]).T,
         "rotation": quaternions(turn.T @ frame),
-        "scale": np.asarray(scale) / size,
-        "species": numbers[kinds],
-        "seed": np.asarray(seed),
+        "scale": placement.scale / size,
+        "species": numbers[placement.species],
+        "seed": placement.seed,
     }
     points, before = _points(obj.data), len(obj.data.vertices)
     for name, kind in fields.FIELD_ATTRIBUTES.items():
@@ -450,9 +429,9 @@ def add_points(
             points[name] = (kind, np.full((before, *own[name].shape[1:]), name == "scale", KINDS[kind].dtype))
     joined: Points = {}
     for name, (kind, values) in points.items():
-        new = own.get(name, np.zeros((len(seed), *values.shape[1:])))
+        new = own.get(name, np.zeros((len(placement), *values.shape[1:])))
         joined[name] = (kind, np.concatenate([values, new.astype(values.dtype)]))
-    _write(obj, joined, before + len(seed))
+    _write(obj, joined, before + len(placement))
 
 
 def assign_field_species(obj: Object, identifier: str) -> bool:
