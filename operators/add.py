@@ -142,10 +142,7 @@ class TETFLORA_OT_populate(ModalJob, Operator, label="Scatter", needs=(in_object
     scale_max: _RULES.scale_max
     species: once.string("Species", "Comma-separated species with optional weights: broadleaf_tree:3, bush:1")
     suited: real(
-        "Suited Distance",
-        "Min Distance that followed from the species; another one was given",
-        -1.0,
-        options={'SKIP_SAVE', 'HIDDEN'},
+        "Suited Distance", "Min Distance by the species; another one was given", -1.0, options={'SKIP_SAVE', 'HIDDEN'}
     )
 
     def steps(self, context: Context) -> Job[PlacedPlants]:

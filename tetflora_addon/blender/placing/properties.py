@@ -260,10 +260,7 @@ class TetFloraLayer(PropertyGroup, settings_in(Limits, Rules, **LIVE), GroundMas
 
     grounds: list_of(TetFloraGround, "Grounds", "Meshes that the plants grow on")
     ground_collection: pointer_to(
-        Collection,
-        "Ground Collection",
-        "All meshes in this collection are ground too, including those added later",
-        **LIVE,
+        Collection, "Ground Collection", "All meshes in this collection are ground too, also those added later", **LIVE
     )
     density: real(
         "Plants per Hectare",
@@ -343,12 +340,7 @@ class TetFloraBrush(PropertyGroup, settings_in(Rules, only=("scale_min", "scale_
         "Create As",
         "What painted plants are created as. Erase and Thin affect both kinds",
         (
-            (
-                'AUTOMATIC',
-                "Automatic",
-                f"Empties until the scene has {MOST_PAINTED_EMPTIES:,}, then the field of painted plants",
-                0,
-            ),
+            ('AUTOMATIC', "Automatic", f"Empties up to {MOST_PAINTED_EMPTIES:,}, then a field of painted plants", 0),
             STORAGE_ITEMS[1],
             ('FIELD', "Field", 'One object, "Painted plants", whose vertices are the plants. Room for millions', 2),
         ),

@@ -243,12 +243,7 @@ class TetFloraSpeciesEditor(bpy.types.PropertyGroup, SpeciesChoice):
         set=lambda self, number: setattr(self, "order_index", number),
     )
     preview_seed: integer(
-        "Seed",
-        "Individual of the species to show in the preview",
-        1,
-        min=0,
-        update=lambda _self, _context: tell_listeners(),
-        **FIXED,
+        "Seed", "Individual to show in the preview", 1, min=0, update=lambda _self, _context: tell_listeners(), **FIXED
     )
     species_name: _text("name", "Name", "Name shown in menus; the identifier that plants refer to does not change")
     species_description: _text("description", "Description", "Tooltip of the species in menus, in one sentence")
@@ -287,7 +282,7 @@ class TetFloraSpeciesEditor(bpy.types.PropertyGroup, SpeciesChoice):
     habit: _number(
         "habit",
         "Forest Habit",
-        "0: trees that stand free; 1: those of a dense stand, with bare, slender trunks and narrow crowns",
+        "0: trees that stand free; 1: those of dense stands, with bare trunks and narrow crowns",
     )
 
 
