@@ -84,9 +84,7 @@ def scene_digest(
         slots = [[getattr(material, "name_full", "") for material in slots] for slots in given.explicit.materials]
         explicit = meshes.surfaces, meshes.surface, meshes.linear, meshes.origin, slots
     species = load_for(given.species, scene, depsgraph) if given.species else []
-    targets = {one.target: "" for one in given.places}
-    for target in targets:
-        targets[target] = digest_of(target, depsgraph)
+    targets = {target: digest_of(target, depsgraph) for target in dict.fromkeys(one.target for one in given.places)}
     places = [
         (targets[p.target], [o.name_full for o in p.owners], p.matrices, p.keys, given.looks[p.owner])
         for p in given.places
@@ -153,9 +151,7 @@ def _around(scene: Scene, depsgraph: Depsgraph, given: SceneContents) -> Around:
         reach = [np.linalg.norm(surface.positions, axis=1).max() for surface in meshes.surfaces]
         centers.append(meshes.origin)
         radii.append(np.array(reach)[meshes.surface] * meshes.largest)
-    reaches = {one.target: 0.0 for one in given.places}
-    for target in reaches:
-        reaches[target] = reach_of(target, depsgraph)
+    reaches = {target: reach_of(target, depsgraph) for target in dict.fromkeys(one.target for one in given.places)}
     for one in given.places:
         centers.append(one.matrices[:, :3, 3])
         radii.append(reaches[one.target] * np.linalg.norm(one.matrices[:, :3, :3], axis=1).max(axis=1))

@@ -78,17 +78,8 @@ def stand_site(ground: Terrain, soil: Soil) -> tuple[StandSite, Floats]:
     if not plantable.any():
         raise SceneError("Vertex Group, Areas, Paths or the biome's limits leave no ground for the stand; change them")
     moisture = np.full(height.shape, soil.moisture) + soil.relief * (wetness - _LEVEL)
-    site = StandSite(
-        0.0,
-        0.0,
-        grid.cell,
-        height,
-        plantable,
-        moisture,
-        np.full(height.shape, soil.fertility),
-        soil.degree_days,
-        soil.coldest_month,
-    )
+    fertility, climate = np.full(height.shape, soil.fertility), (soil.degree_days, soil.coldest_month)
+    site = StandSite(0.0, 0.0, grid.cell, height, plantable, moisture, fertility, *climate)
     return site, np.array([grid.west, grid.south])
 
 

@@ -296,10 +296,7 @@ def _on_load_post(_path: object, _other: object = None) -> None:
 
 _HANDLERS = handlers(load_pre=_on_load_pre, load_post=_on_load_post)
 _IN_WINDOW = handlers(
-    depsgraph_update_post=_on_update,
-    frame_change_post=_on_frame,
-    undo_post=state.bring_in_step,
-    redo_post=state.bring_in_step,
+    depsgraph_update_post=_on_update, frame_change_post=_on_frame, undo_post=state.on_undo, redo_post=state.on_undo
 )
 
 
