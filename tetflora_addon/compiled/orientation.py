@@ -16,7 +16,7 @@ from typing import Self
 
 import numpy as np
 
-from ..arrays import GOLDEN_ANGLE, Floats, Integers, Table, columns, cross, perpendicular, spiral
+from ..arrays import Floats, Integers, Table, columns, cross, perpendicular, spiral
 from ..growth import foliage
 from ..growth.axes import Axes, axes
 from ..growth.growth import branch_counts, chosen_children, drawn_children, fullness, leaf_counts, radius_at
@@ -151,7 +151,7 @@ def orientation_of(rows: Table, forms: Sequence[Forms], leaf: Floats, wood: Floa
         cos = 1 - 2 * (np.arange(_BRANCHES) + 0.5) / _BRANCHES
         if bool(rows["order"][i] == 0):  # most plants stand, and few lie
             cos = 1 - 2 * ((1 - cos) / 2) ** 3
-        sky = spiral(cos, np.arange(_BRANCHES), GOLDEN_ANGLE)
+        sky = spiral(cos, np.arange(_BRANCHES))
         sky[1::2] = met[thinned(len(met), len(sky[1::2]))]
         branches = _sample_branches(i, float(length[i]), sky)
         lines = axes(rows, branches)

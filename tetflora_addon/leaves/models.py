@@ -172,7 +172,7 @@ def mean_silhouette(model: LeafModel) -> float:
     corners = fans(model)[1]
     number = np.arange(_DIRECTIONS)
     total = 0.0
-    for toward in spiral((number + 0.5) / _DIRECTIONS, number, GOLDEN_ANGLE):
+    for toward in spiral((number + 0.5) / _DIRECTIONS, number):
         across = perpendicular(toward[None])[0]
         flat = corners @ np.stack([across, np.cross(toward, across)], axis=1)
         low, high = flat.min(axis=(0, 1)), flat.max(axis=(0, 1))

@@ -516,13 +516,13 @@ def whole_cuts(order: Order) -> list[float]:
     return cuts[: max(sum(cut < order.growing.now - _FORKS_FROM for cut in cuts[:-1]), 1) + 1]
 
 
-def crown_ratio(shape: Integers, r: Floats) -> Floats:
+def crown_ratio(shape: Integers | str, r: Floats) -> Floats:
     """Length ratio of a child, 0 to 1.
 
     Parameters
     ----------
-    shape : (...) int
-        Index into `CROWN_PROFILES`.
+    shape : (...) int or str
+        Index into `CROWN_PROFILES`, or one of these for all.
     r : (...) float64
         1 at the lowest child, 0 at the parent's tip.
 
@@ -535,7 +535,7 @@ def crown_ratio(shape: Integers, r: Floats) -> Floats:
     """
     r = np.clip(r, 0.0, 1.0)
     return np.choose(
-        shape,
+        CROWN_PROFILES.index(shape) if isinstance(shape, str) else shape,
         [
             0.2 + 0.8 * r,
             0.2 + 0.8 * np.sin(np.pi * r),
