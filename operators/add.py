@@ -4,7 +4,7 @@
 
 import bpy
 from bpy.props import FloatVectorProperty
-from bpy.types import Operator
+from bpy.types import Context, Object, Operator, PropertyGroup, Scene
 
 from ..tetflora_addon.blender.attributes import world_matrix
 from ..tetflora_addon.blender.declare import choice, once, real
@@ -45,7 +45,7 @@ class TETFLORA_OT_add_plant(Reporting, Operator, label="Add Plant", needs=(in_ob
     azimuth: once.real("Azimuth", "Rotation around the vertical axis", subtype='ANGLE')
     scale: once.real("Scale", "Scale of the plant; 1 is the size in the species file", 1.0, **within(0.01, 4.0))
 
-    def run(self, context: bpy.types.Context) -> set[str]:
+    def run(self, context: Context) -> set[str]:
         properties = self.properties
         if not properties.is_property_set("location"):
             self.location = context.scene.cursor.location
@@ -72,7 +72,7 @@ class TETFLORA_OT_use_as_skeleton(
     The skeleton is no longer rendered.
     """
 
-    def run(self, context: bpy.types.Context) -> set[str]:
+    def run(self, context: Context) -> set[str]:
         form, depsgraph = context.active_object, context.evaluated_depsgraph_get()
         skeleton = read_skeleton(form, depsgraph)  # refuses what cannot be one before anything changes
         plants = selected_plants(context)
@@ -100,7 +100,7 @@ class TETFLORA_OT_first_forest(Reporting, Operator, label="First Forest", needs=
 
     seed: once.integer("Seed", "A different seed gives a different forest")
 
-    def run(self, context: bpy.types.Context) -> set[str]:
+    def run(self, context: Context) -> set[str]:
         scene, note = build(context, self.seed)
         # Select the ground, so that Scatter and the brush go on from there, and not the startup's hidden cube.
         layer = scene.view_layers[0]
@@ -142,13 +142,10 @@ class TETFLORA_OT_populate(ModalJob, Operator, label="Scatter", needs=(in_object
     scale_max: _RULES.scale_max
     species: once.string("Species", "Comma-separated species with optional weights: broadleaf_tree:3, bush:1")
     suited: real(
-        "Suited Distance",
-        "Min Distance that followed from the species; another one was given",
-        -1.0,
-        options={'SKIP_SAVE', 'HIDDEN'},
+        "Suited Distance", "Min Distance by the species; another one was given", -1.0, options={'SKIP_SAVE', 'HIDDEN'}
     )
 
-    def steps(self, context: bpy.types.Context) -> Job[PlacedPlants]:
+    def steps(self, context: Context) -> Job[PlacedPlants]:
         scene = context.scene
         yield Progress(0.0, "Reading the ground")
         # Take what was not given from the panel; the redo panel then shows what was really used.
@@ -171,16 +168,14 @@ class TETFLORA_OT_populate(ModalJob, Operator, label="Scatter", needs=(in_object
             population = self._population(scene, grounds_to_plant(context), weights)
             return (yield from make_plants_steps(scene, context.evaluated_depsgraph_get(), population))
 
-    def finish(self, context: bpy.types.Context, result: PlacedPlants) -> set[str]:
+    def finish(self, context: Context, result: PlacedPlants) -> set[str]:
         grounds = grounds_to_plant(context)
         select_only(context, [*result.objects, *grounds])
         # The terrain stays selected and active, so that one Scatter can follow another.
         context.view_layer.objects.active = grounds[0]
         return tell_placed(self, result)
 
-    def _population(
-        self, scene: bpy.types.Scene, grounds: list[bpy.types.Object], weights: dict[str, float]
-    ) -> bpy.types.PropertyGroup:
+    def _population(self, scene: Scene, grounds: list[Object], weights: dict[str, float]) -> PropertyGroup:
         """A new population with the settings for new ones, and over them what was given."""
         population = add_population(scene, grounds)
         settings = scene.tetflora.populate
@@ -203,7 +198,7 @@ class TETFLORA_OT_populate(ModalJob, Operator, label="Scatter", needs=(in_object
         return population
 
 
-def mix_in(settings: bpy.types.PropertyGroup) -> str:
+def mix_in(settings: PropertyGroup) -> str:
     """The species of a population with their weights, as `parse_weights` reads them."""
     mix = [(entry.species, entry.weight) for entry in settings.mix if entry.species]
     return ", ".join(f"{name}:{weight:g}" for name, weight in mix) or default_species()

@@ -36,14 +36,10 @@ class TETFLORA_OT_export_forest(
         **within(1, 64, forest.MOST_VARIANTS),
     )
     levels: once.integer(
-        "Levels",
-        "Levels of detail with the full plant; 0 for as many as suit each species",
-        **within(0, high=forest.LEVELS),
+        "Levels", "Levels with the full plant; 0 for as many as suit each species", **within(0, high=forest.LEVELS)
     )
     polygons: once.integer(
-        "Max Polygons",
-        "Leave out levels of detail with more polygons than this; 0 for none",
-        **within(0, 1_000_000, 100_000_000),
+        "Max Polygons", "Leave out levels with more polygons than this; 0 for none", **within(0, 1_000_000, 100_000_000)
     )
     bake: once.boolean("Bake Materials", "Bake veins, bark and relief with Cycles, not only colors and outlines", True)
 

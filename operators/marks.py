@@ -176,11 +176,7 @@ class TETFLORA_OT_convert_plants(
                 "Replace the selected plants with one object whose vertices are the same plants. This keeps Blender "
                 "fast with many plants; parents, constraints and animation of single plants are lost",
             ),
-            (
-                'OBJECTS',
-                "Objects",
-                f"Replace the selected fields with one empty per plant. At most {MOST_EMPTIES:,} plants",
-            ),
+            ('OBJECTS', "Objects", f"Replace the fields with one empty per plant. At most {MOST_EMPTIES:,} plants"),
         ),
     )
 

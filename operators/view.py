@@ -6,7 +6,7 @@ from math import cos, exp, radians, sin
 
 import bpy
 import numpy as np
-from bpy.types import Operator
+from bpy.types import Context, Object, Operator, Scene, SpaceView3D, World
 from mathutils import Matrix, Vector
 
 from ..tetflora_addon.blender.declare import choice, real, string
@@ -45,7 +45,7 @@ class TETFLORA_OT_look(Reporting, Operator, label="Look from Here", needs=(in_ob
         ),
     )
 
-    def run(self, context: bpy.types.Context) -> set[str]:
+    def run(self, context: Context) -> set[str]:
         space, scene = _view(context), context.scene
         frozen = getattr(state.find(scene), "frozen", None)
         if self.where == 'BACK':
@@ -74,7 +74,7 @@ class TETFLORA_OT_look(Reporting, Operator, label="Look from Here", needs=(in_ob
         return self.done(f'"{camera.name}" looks from here')
 
 
-def _view(context: bpy.types.Context) -> bpy.types.SpaceView3D | None:
+def _view(context: Context) -> SpaceView3D | None:
     """The 3D view that was clicked in, else the largest of the window; None in the background."""
     if context.space_data is not None and context.space_data.type == 'VIEW_3D':
         return context.space_data
@@ -83,7 +83,7 @@ def _view(context: bpy.types.Context) -> bpy.types.SpaceView3D | None:
     return None if largest is None or bpy.app.background else largest.spaces.active
 
 
-def _camera(scene: bpy.types.Scene) -> bpy.types.Object:
+def _camera(scene: Scene) -> Object:
     """The scene's camera, or a new one where there is none that may be moved."""
     camera = scene.camera
     if camera is None or camera.type != 'CAMERA' or camera.animation_data is not None or camera.library is not None:
@@ -98,7 +98,7 @@ def _corners(ground: Ground) -> list[Vector]:
     return [obj.matrix_world @ Vector(corner) for obj in ground.objects for corner in obj.bound_box]
 
 
-def _at_eye_height(scene: bpy.types.Scene, ground: Ground, view: Matrix) -> Matrix:
+def _at_eye_height(scene: Scene, ground: Ground, view: Matrix) -> Matrix:
     """Upright on the ground under the middle of the view or, if that is in the sky, under the viewer."""
     ahead = view.to_3x3() @ Vector((0.0, 0.0, -1.0))
     flat = Vector((ahead.x, ahead.y, 0.0))
@@ -142,7 +142,7 @@ def _above(ground: Ground, view: Matrix, camera: bpy.types.Camera) -> Matrix:
     return Matrix.Translation(middle - ahead * float(away)) @ turn.to_matrix().to_4x4()
 
 
-def look_from(space: bpy.types.SpaceView3D, camera: Camera) -> None:
+def look_from(space: SpaceView3D, camera: Camera) -> None:
     """Turn a viewport to where a camera looks; the image is as wide as the viewport."""
     region = space.region_3d
     region.view_perspective = 'ORTHO' if camera.kind == "ORTHO" else 'PERSP'
@@ -164,7 +164,7 @@ class TETFLORA_OT_daylight(Reporting, Operator, label="Daylight"):
     clouds: real("Clouds", "How much of the sky is covered: at 1 there are no shadows", **FACTOR)
     haze: real("Haze", "How milky the air is", 0.2, **FACTOR)
 
-    def run(self, context: bpy.types.Context) -> set[str]:
+    def run(self, context: Context) -> set[str]:
         scene = context.scene
         ahead, height = sun_direction(scene, self.hour)
         kept = []
@@ -187,14 +187,14 @@ class TETFLORA_OT_daylight(Reporting, Operator, label="Daylight"):
         return self.done(f"The sun stands {np.degrees(height):.0f}° high{rest}")
 
 
-def _is_startup_lamp(obj: bpy.types.Object) -> bool:
+def _is_startup_lamp(obj: Object) -> bool:
     """Whether it is the lamp that Blender starts with, as it was."""
     if obj.type != 'LIGHT' or obj.data.type != 'POINT' or obj.animation_data or obj.data.animation_data:
         return False
     return obj.data.energy == 1000.0 and (obj.matrix_basis.translation - Vector(_STARTUP_LAMP)).length < 1e-3
 
 
-def sun_direction(scene: bpy.types.Scene, hour: float) -> tuple[Vector, float]:
+def sun_direction(scene: Scene, hour: float) -> tuple[Vector, float]:
     """Where the sun is at an hour of the scene's day, from the ground, and its height in radians; +Y is north."""
     year = scene.tetflora.year
     tilt = -radians(23.44) * cos(2.0 * np.pi * ((year.day if year.enabled else _SUMMER) + 10.0) / 365.0)
@@ -207,9 +207,7 @@ def sun_direction(scene: bpy.types.Scene, hour: float) -> tuple[Vector, float]:
     return found, float(np.arcsin(found.z))
 
 
-def _shine(
-    scene: bpy.types.Scene, sun: bpy.types.Object | None, ahead: Vector, height: float, clouds: float, haze: float
-) -> None:
+def _shine(scene: Scene, sun: Object | None, ahead: Vector, height: float, clouds: float, haze: float) -> None:
     """A sun of that height: weaker and redder near the horizon, soft behind clouds."""
     if sun is None:
         sun = bpy.data.objects.new("Daylight sun", bpy.data.lights.new("Daylight sun", 'SUN'))
@@ -224,7 +222,7 @@ def _shine(
     sun.location = 40.0 * ahead
 
 
-def _cover(scene: bpy.types.Scene, height: float, clouds: float, haze: float) -> None:
+def _cover(scene: Scene, height: float, clouds: float, haze: float) -> None:
     """A sky: blue above, pale below; gray with clouds, whiter with haze, dim where the sun is low."""
     world = scene.world if scene.world is not None and _OURS in scene.world else sky("Daylight sky")
     if world is not scene.world:
@@ -242,7 +240,7 @@ def _cover(scene: bpy.types.Scene, height: float, clouds: float, haze: float) ->
     next(node for node in nodes if node.type == 'BACKGROUND').inputs["Strength"].default_value = 0.7 * light
 
 
-def _is_plain(world: bpy.types.World) -> bool:
+def _is_plain(world: World) -> bool:
     """Whether a world is as in new files: one color, and gray."""
     if world.node_tree is None:
         return max(world.color) - min(world.color) < 1e-4
@@ -258,7 +256,7 @@ class TETFLORA_OT_mend(Reporting, Operator, label="Mend", options={'REGISTER', '
 
     what: string("What", "What to mend, as the panel names it")
 
-    def run(self, context: bpy.types.Context) -> set[str]:
+    def run(self, context: Context) -> set[str]:
         if self.what == "light":
             return bpy.ops.tetflora.daylight()
         if self.what == "camera":

@@ -7,6 +7,7 @@ from textwrap import wrap
 from typing import Any, NamedTuple
 
 import bpy
+from bpy.types import ID, Context, Menu, Panel, PropertyGroup, Scene, UILayout, UIList, bpy_struct
 
 from ..tetflora_addon.blender.species.catalog import FALLBACK_ICON, icon_of
 from .help import draw_help
@@ -14,12 +15,12 @@ from .help import draw_help
 #: Scale of the pictures of a gallery where there is room.
 GALLERY = 5.0
 
-Draw = Callable[[bpy.types.UILayout, bpy.types.Context], None]
+Draw = Callable[[UILayout, Context], None]
 
 
 def panel(
-    label: str, manual: str, tab: str = "", poll: Callable[[bpy.types.Context], object] | None = None, **options: object
-) -> Callable[[Draw], type[bpy.types.Panel]]:
+    label: str, manual: str, tab: str = "", poll: Callable[[Context], object] | None = None, **options: object
+) -> Callable[[Draw], type[Panel]]:
     """Make a panel of the function that draws it; labels are to the left of values, as elsewhere in Blender.
 
     Parameters
@@ -39,25 +40,25 @@ def panel(
     place["draw_header_preset"] = lambda self, _context: draw_help(self.layout, self.manual)
     if poll is not None:
         place["poll"] = classmethod(lambda _cls, context: bool(poll(context)))
-    return _drawn_by(bpy.types.Panel, {**place, "bl_label": label, "manual": f"manual/{manual}", **options}, True)
+    return _drawn_by(Panel, {**place, "bl_label": label, "manual": f"manual/{manual}", **options}, True)
 
 
-def popover(label: str, width: int) -> Callable[[Draw], type[bpy.types.Panel]]:
+def popover(label: str, width: int) -> Callable[[Draw], type[Panel]]:
     """The same of a panel that a button opens, so many units wide."""
     place = {"bl_space_type": 'VIEW_3D', "bl_region_type": 'HEADER', "bl_options": {'INSTANCED'}}
-    return _drawn_by(bpy.types.Panel, {**place, "bl_label": label, "bl_ui_units_x": width})
+    return _drawn_by(Panel, {**place, "bl_label": label, "bl_ui_units_x": width})
 
 
-def menu(label: str) -> Callable[[Draw], type[bpy.types.Menu]]:
+def menu(label: str) -> Callable[[Draw], type[Menu]]:
     """The same of a menu."""
-    return _drawn_by(bpy.types.Menu, {"bl_label": label})
+    return _drawn_by(Menu, {"bl_label": label})
 
 
 def _drawn_by(kind: type, members: dict[str, object], split: bool = False) -> Callable[[Draw], type]:
     """A class of a function's name and module, which that draws; split, labels are to the left of values."""
 
     def made(function: Draw) -> type:
-        def draw(self: Any, context: bpy.types.Context) -> None:
+        def draw(self: Any, context: Context) -> None:
             if split:
                 self.layout.use_property_split, self.layout.use_property_decorate = True, False
             function(self.layout, context)
@@ -69,8 +70,8 @@ def _drawn_by(kind: type, members: dict[str, object], split: bool = False) -> Ca
 
 
 def section(
-    layout: bpy.types.UILayout, title: str, closed: bool = True, switch: tuple[bpy.types.bpy_struct, str] | None = None
-) -> bpy.types.UILayout | None:
+    layout: UILayout, title: str, closed: bool = True, switch: tuple[bpy_struct, str] | None = None
+) -> UILayout | None:
     """Begin a section of a panel, with the property that turns it on in its header; None while it is closed."""
     header, body = layout.panel(title, default_closed=closed)
     if switch is not None:
@@ -80,9 +81,7 @@ def section(
     return body
 
 
-def draw_message(
-    context: bpy.types.Context, layout: bpy.types.UILayout, text: str, icon: str = 'ERROR', width: int = 0
-) -> None:
+def draw_message(context: Context, layout: UILayout, text: str, icon: str = 'ERROR', width: int = 0) -> None:
     """A text over several lines, because Blender does not wrap; a letter is some 7 pixels wide at a scale of 1.
 
     ``width`` is that of a popover at a scale of 1; that of the region, which has tabs and sections, if not given.
@@ -100,7 +99,7 @@ def thumbnail(identifier: str) -> dict[str, str | int]:
     return {"icon_value": number} if number else {"icon": FALLBACK_ICON}
 
 
-def draw_below(layout: bpy.types.UILayout, text: str, name: str = "") -> None:
+def draw_below(layout: UILayout, text: str, name: str = "") -> None:
     """A note where values are, under a property or with a name of its own."""
     row = layout.split(factor=0.4)
     left = row.row()
@@ -109,13 +108,13 @@ def draw_below(layout: bpy.types.UILayout, text: str, name: str = "") -> None:
     row.label(text=text)
 
 
-def draw_properties(layout: bpy.types.UILayout, owner: bpy.types.bpy_struct, *names: str) -> None:
+def draw_properties(layout: UILayout, owner: bpy_struct, *names: str) -> None:
     """Draw properties of an owner one below the other."""
     for name in names:
         layout.prop(owner, name)
 
 
-def draw_where(layout: bpy.types.UILayout, owner: bpy.types.PropertyGroup) -> None:
+def draw_where(layout: UILayout, owner: PropertyGroup) -> None:
     """Draw what limits where on its grounds something grows, and the menu of what can: the same for all that grows."""
     known, shown = owner.bl_rna.properties, owner.limits
     ground = next((entry.object for entry in owner.grounds if entry.object is not None), None)
@@ -154,9 +153,7 @@ def draw_where(layout: bpy.types.UILayout, owner: bpy.types.PropertyGroup) -> No
             layout.prop(owner, "path_distance")
 
 
-def _draw_search(
-    layout: bpy.types.UILayout, owner: bpy.types.PropertyGroup, name: str, place: bpy.types.ID | None, names: str
-) -> None:
+def _draw_search(layout: UILayout, owner: PropertyGroup, name: str, place: ID | None, names: str) -> None:
     """Draw a name to choose from those of a datablock, or to type where there is none."""
     if place is not None:
         layout.prop_search(owner, name, place, names)
@@ -164,9 +161,7 @@ def _draw_search(
         layout.prop(owner, name)
 
 
-def draw_numbers(
-    layout: bpy.types.UILayout, owner: bpy.types.PropertyGroup, name: str, number: int = 2, text: str | None = None
-) -> None:
+def draw_numbers(layout: UILayout, owner: PropertyGroup, name: str, number: int = 2, text: str | None = None) -> None:
     """Draw the first numbers of a setting beside each other, with another text than its label where one is given."""
     prop, row = owner.bl_rna.properties[name], layout.row(align=True)
     for index in range(number):
@@ -181,7 +176,7 @@ class Button(NamedTuple):
     text: str | None = None
     values: dict[str, object] = {}
 
-    def draw(self, layout: bpy.types.UILayout, **options: object) -> None:
+    def draw(self, layout: UILayout, **options: object) -> None:
         """Draw it, with further options of ``UILayout.operator``."""
         text = {} if self.text is None else {"text": self.text}
         made = layout.operator(f"tetflora.{self.operator}", icon=self.icon, **text, **options)
@@ -189,7 +184,7 @@ class Button(NamedTuple):
             setattr(made, name, value)
 
 
-def draw_buttons(layout: bpy.types.UILayout, *buttons: Button | None) -> None:
+def draw_buttons(layout: UILayout, *buttons: Button | None) -> None:
     """Draw buttons one below the other; None is a separator."""
     for button in buttons:
         if button is None:
@@ -198,7 +193,7 @@ def draw_buttons(layout: bpy.types.UILayout, *buttons: Button | None) -> None:
             button.draw(layout)
 
 
-class TETFLORA_UL_species(bpy.types.UIList):
+class TETFLORA_UL_species(UIList):
     """Species of a list, each with another property beside it; of fields, with its number."""
 
     #: Property beside the species, by the name of the list's owner's active index; width of the species.
@@ -222,10 +217,10 @@ class TETFLORA_UL_species(bpy.types.UIList):
             row.prop(item, beside, text="")
 
 
-def draw_species(layout: bpy.types.UILayout, owner: bpy.types.PropertyGroup, entries: str = "species") -> None:
+def draw_species(layout: UILayout, owner: PropertyGroup, entries: str = "species") -> None:
     """Draw a list of species of an owner, with buttons to add and remove."""
     place = "scene"
-    if not isinstance(owner.id_data, bpy.types.Scene):
+    if not isinstance(owner.id_data, Scene):
         place = f'blend_data.objects["{bpy.utils.escape_identifier(owner.id_data.name)}"]'
     given = {"owner": f"{place}.{owner.path_from_id()}", "entries": entries, "action": 'REMOVE'}
     row = layout.row()

@@ -5,14 +5,7 @@
 import bpy
 
 from ..tetflora_addon.blender.species.catalog import own_file
-from ..tetflora_addon.blender.species.editor import (
-    NO_LEAF,
-    OBJECT_LEAF,
-    VARIATION,
-    orders_of,
-    present_order,
-    present_species,
-)
+from ..tetflora_addon.blender.species.editor import NONE, OBJECT, VARIATION, orders_of, present_order, present_species
 from ..tetflora_addon.blender.species.edits import find_edit, problem_of, skipped_files
 from ..tetflora_addon.blender.viewport import species
 from ..tetflora_addon.species.catalog import ORDER_KEYS
@@ -92,9 +85,9 @@ def _draw_whole(layout: bpy.types.UILayout, editor: bpy.types.PropertyGroup) -> 
     for kind in LEAF_KINDS:
         form = getattr(editor, f"{kind}_form")
         layout.prop(editor, f"{kind}_form")
-        if form == OBJECT_LEAF:
+        if form == OBJECT:
             layout.prop_search(editor, f"{kind}_object", bpy.data, "objects")
-        if form != NO_LEAF:
+        if form != NONE:
             layout.prop(editor, f"{kind}_transmission", text="Translucency")
     draw_properties(layout, editor, "bark", "quality", "habit", "exact")
 

@@ -278,7 +278,7 @@ def perpendicular(axis: NDArray) -> NDArray:
     return unit(np.cross(axis, np.where(np.abs(axis[:, 2:]) < 0.9, [[0.0, 0.0, 1.0]], [[1.0, 0.0, 0.0]])))
 
 
-def spiral(z: NDArray, index: NDArray, step: float) -> NDArray:
+def spiral(z: NDArray, index: NDArray, step: float = GOLDEN_ANGLE) -> NDArray:
     """Unit vectors (n, 3) of a Fibonacci lattice: heights z (n,), turned by ``index`` (n,) × ``step`` radians."""
     turn, level = step * index, np.sqrt(1.0 - z * z)
     return np.stack([level * np.cos(turn), level * np.sin(turn), z], axis=1)

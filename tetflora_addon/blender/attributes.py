@@ -11,13 +11,13 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import NamedTuple
 
-import bpy
 import numpy as np
+from bpy.types import ID, Attribute, Curves, Depsgraph, Image, Mesh, Object, PointCloud, bpy_prop_collection
 from numpy.typing import DTypeLike, NDArray
 
 from ..arrays import Floats, Floats32, Integers32, Mask, linear_of
 
-Geometry = bpy.types.Mesh | bpy.types.PointCloud | bpy.types.Curves
+Geometry = Mesh | PointCloud | Curves
 
 
 class AttributeType(NamedTuple):
@@ -74,7 +74,7 @@ def read(geometry: Geometry, name: str) -> NDArray:
     return empty(KINDS[_BUILT_IN[name]], 0) if attribute is None else values_of(attribute)
 
 
-def values_of(attribute: bpy.types.Attribute, field: str = "") -> NDArray:
+def values_of(attribute: Attribute, field: str = "") -> NDArray:
     """Values as stored, (n,) or (n, width), in the type's own dtype; of another field of the elements if named."""
     kind = KINDS[attribute.data_type]
     values = empty(kind, len(attribute.data))
@@ -104,9 +104,7 @@ def write(geometry: Geometry, name: str, values: NDArray, domain: str = 'POINT',
         attribute.data.foreach_set(kind.field, np.ascontiguousarray(values, kind.dtype).reshape(-1))
 
 
-def members(
-    collection: bpy.types.bpy_prop_collection, name: str, width: int = 1, dtype: DTypeLike = np.float32
-) -> NDArray:
+def members(collection: bpy_prop_collection, name: str, width: int = 1, dtype: DTypeLike = np.float32) -> NDArray:
     """A property of all members of a collection, (n,) or (n, width)."""
     values = empty(AttributeType(name, dtype, width), len(collection))
     collection.foreach_get(name, values.reshape(-1))
@@ -123,13 +121,13 @@ def empty(kind: AttributeType, size: int) -> NDArray:
 elsewhere: dict[int, Floats] = {}
 
 
-def world_matrix(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Floats:
+def world_matrix(obj: Object, depsgraph: Depsgraph) -> Floats:
     """As `_matrix_now`, or at another moment while somebody asks for that."""
     matrix = _matrix_now(obj, depsgraph)
     return elsewhere[obj.session_uid] @ matrix if obj.session_uid in elsewhere else matrix
 
 
-def _matrix_now(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Floats:
+def _matrix_now(obj: Object, depsgraph: Depsgraph) -> Floats:
     """An object's evaluated matrix in world space, (4, 4); float32 in some versions of Blender.
 
     Objects that are disabled in viewports but render are not evaluated, and their stored matrix may be old. Then it
@@ -143,13 +141,13 @@ def _matrix_now(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Floats
     return own if parent is None else _matrix_now(parent, depsgraph) @ np.array(obj.matrix_parent_inverse) @ own
 
 
-def is_animated(datablock: bpy.types.ID | None) -> bool:
+def is_animated(datablock: ID | None) -> bool:
     """Whether keys, drivers or strips animate a datablock."""
     animation = getattr(datablock, "animation_data", None)
     return animation is not None and bool(animation.action or animation.drivers or animation.nla_tracks)
 
 
-def moves(obj: bpy.types.Object | None) -> bool:
+def moves(obj: Object | None) -> bool:
     """Whether anything may move an object or one of its parents, and motion blur is on for it."""
     if obj is not None and not getattr(getattr(obj, "cycles", None), "use_motion_blur", True):
         return False
@@ -193,7 +191,7 @@ def frames_of(linear: Floats) -> tuple[Floats, Floats, Mask]:
     return frame, lengths.mean(axis=1), sound
 
 
-def image_pixels(image: bpy.types.Image) -> Floats32:
+def image_pixels(image: Image) -> Floats32:
     """Pixels (height, width, channels) of an image that has some, row 0 lowest, in its own color space.
 
     Pixels with a channel that is not finite, such as the sun in an EXR, are black and transparent, as in Cycles.
@@ -207,7 +205,7 @@ def image_pixels(image: bpy.types.Image) -> Floats32:
     return pixels
 
 
-def linear_rgb(image: bpy.types.Image, pixels: NDArray[np.floating]) -> NDArray[np.floating]:
+def linear_rgb(image: Image, pixels: NDArray[np.floating]) -> NDArray[np.floating]:
     """Linear RGB (..., 3) of some pixels (..., channels) of an image."""
     color = pixels[..., :3] if pixels.shape[-1] >= 3 else np.repeat(pixels[..., :1], 3, axis=-1)
     if image.colorspace_settings.name == "sRGB" and not image.is_float:
@@ -215,13 +213,13 @@ def linear_rgb(image: bpy.types.Image, pixels: NDArray[np.floating]) -> NDArray[
     return color
 
 
-def face_offsets(mesh: bpy.types.Mesh) -> Integers32:
+def face_offsets(mesh: Mesh) -> Integers32:
     """First corner of each face, and the number of corners: (faces + 1,)."""
     return np.append(members(mesh.polygons, "loop_start", dtype=np.int32), np.int32(len(mesh.loops)))
 
 
 @contextmanager
-def mesh_of(obj: bpy.types.Object) -> Iterator[bpy.types.Mesh | None]:
+def mesh_of(obj: Object) -> Iterator[Mesh | None]:
     """The mesh of an object, evaluated or not, while the context lasts; None for what cannot have any."""
     try:
         mesh = obj.to_mesh()

@@ -75,7 +75,7 @@ class TetFloraObject(bpy.types.PropertyGroup, SpeciesChoice):
     )
     seed: integer(
         "Seed",
-        "Each seed is a different individual of the species; the same seed always gives the same plant",
+        "Each seed is another individual of the species; the same seed gives the same plant",
         override=_OVERRIDES,
     )
     enabled: boolean("Enabled", "Include the plant in refinement and renders", True, override=_OVERRIDES)
@@ -88,9 +88,7 @@ class TetFloraObject(bpy.types.PropertyGroup, SpeciesChoice):
         **HIDDEN,
     )
     field_species: list_of(
-        TetFloraFieldEntry,
-        "Field Species",
-        "Species that the attribute species of a field's points refers to, starting at 0",
+        TetFloraFieldEntry, "Field Species", "Species that the attribute species of the points refers to, starting at 0"
     )
     field_species_index: integer("Active Field Species", options={'HIDDEN', 'SKIP_SAVE'})
     add_species: gallery_of("field_species", TetFloraFieldEntry)
@@ -218,9 +216,7 @@ class TetFloraScene(RefinementProperties, library.BiomeChoice, bpy.types.Propert
 
     populate: pointer_to(properties.TetFloraLayer)
     layers: list_of(
-        properties.TetFloraLayer,
-        "Layers",
-        "What grows on the grounds of the scene, each with the rules to grow it again",
+        properties.TetFloraLayer, "Layers", "What grows on the scene's grounds, each with the rules to grow it again"
     )
     layers_index: integer("Active Layer", options={'HIDDEN', 'SKIP_SAVE'})
     stand: pointer_to(stand_properties.TetFloraStand)
@@ -239,10 +235,7 @@ class TetFloraScene(RefinementProperties, library.BiomeChoice, bpy.types.Propert
         **HIDDEN,
     )
     asset_species: list_of(
-        asset_species.TetFloraAssetSpecies,
-        "Asset Species",
-        "Objects and collections of this file that are species",
-        **HIDDEN,
+        asset_species.TetFloraAssetSpecies, "Asset Species", "Objects and collections that are species", **HIDDEN
     )
     linked_scatters: list_of(
         objects.TetFloraLinkedScatter, "Linked Scatterers", "Linked objects whose scatter is refined", **HIDDEN

@@ -17,6 +17,7 @@ those of `growth.seasons`; nothing is measured anew for a day.
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from operator import attrgetter
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,7 +29,7 @@ from ..growth.foliage import YOUTH
 from ..growth.rows import DEAD, FORK, LATERAL, NOW, SPUR, fullness_of, lengths, living, spread_children
 from ..growth.seeds import BASE, LEAVES, MOST, WIDTH, Branches
 from ..leaves.levels import hidden_gloss
-from ..leaves.models import LeafModel
+from ..leaves.models import Forms, LeafModel
 from ..species.members import dead_vigor, expected_forks
 from ..species.species import EVEN, LEAF_KINDS, Range, Species
 
@@ -81,7 +82,7 @@ def tube_perimeter(sides: Integers) -> Floats:
     return 2 * sides * np.sin(np.pi / sides)
 
 
-def row_leaves(rows: Table, forms: Sequence[Sequence[Sequence[LeafModel]]], transmission: NDArray) -> RowLeaves:
+def row_leaves(rows: Table, forms: Sequence[Forms], transmission: NDArray) -> RowLeaves:
     """Means over the forms of leaves of species and kinds; ``transmission`` is (species, kinds)."""
     kind = rows["species"], rows["leaf_kind"]
 
@@ -313,6 +314,70 @@ class ShapedTotals:
     power: Floats
     borne: Floats  # (r, b, 3, t): what of that limbs bear
 
+    @classmethod
+    def of(cls, rows: Table, totals: Averages, polygons: Floats) -> Self:
+        """Totals of all rows.
+
+        Parameters
+        ----------
+        rows : (r,) parameter table
+        totals : Averages
+            Of plants as described.
+        polygons : (r,) float64
+            Faces of a leaf of each row.
+        """
+        every = np.arange(len(rows))
+        bearing = (rows["next"][:, (LATERAL, DEAD, FORK)] >= 0).any(axis=1)
+        solid = rows["phantom"] | rows["drawn"] | (rows["envelope"] > 0)
+        shaped = (rows["order"] == 0) & bearing & ~solid & ~crown_effects.are_stools(rows, every)
+        power, borne = np.zeros((2, len(rows), len(_BASES), 3, _TOTALS))
+        kinds = np.arange(KINDS) == rows["leaf_kind"][:, None]
+        all_leaves = np.concatenate([totals.leaf_area[:, 1] @ kinds, (totals.leaves * polygons) @ kinds], axis=1)
+        exact = rows.copy()
+        exact["taper"][:, 1] = 0
+        for i in np.flatnonzero(shaped)[::-1]:  # stems before what they grow on
+            own, on_limbs = power[i], borne[i]
+            own[:, 0, _AREA] += totals.leaf_area[i, 1, i] * kinds[i]
+            own[:, 0, _LEAF_FACES] += totals.leaves[i, i] * polygons[i] * kinds[i]
+            own[:, 0, _FACES] += totals.fixed_faces[i, i]
+            own[:, 0, _WOOD] += totals.fixed_wood[i, i]
+            trunk = np.argmax(rows["species"] == rows["species"][i])
+            below, above = crown_effects.trunk_ratios(_BASES, rows["part"][trunk, 1])
+            stretch = above if rows["continues"][i] else below
+            for sort in np.flatnonzero(rows["next"][i] >= 0):
+                j = rows["next"][i, sort]
+                leaves = all_leaves[j]
+                fixed_faces, full_faces, fixed_wood, full_wood, spurs = (
+                    getattr(totals, name)[j].sum() for name in _OF_WOOD
+                )
+                if sort in (FORK, SPUR):
+                    one = children_sums(exact, i, int(sort))
+                if sort == FORK:
+                    for whole, its in ((own, power[j]), (on_limbs, borne[j])):
+                        stem = its * one.number
+                        stem[:, :, _WOOD] = its[:, :, _WOOD] * one.wood * (above / stretch)[:, None]
+                        whole += stem
+                elif sort == SPUR:
+                    own[:, 0, _LEAVES] += one.full * leaves
+                    own[:, 0, _FACES] += one.number * fixed_faces + one.full * full_faces
+                    own[:, 0, _SPURS] += one.wood * fixed_wood + one.full_wood * full_wood + one.full * spurs
+                else:
+                    weight = rows["count_by_length"][j]
+                    for b, base in enumerate(_BASES):
+                        number, bearing, longer, wood, full, more = _limbs(exact, int(i), int(sort), base)
+                        still, grows = (1 - weight) * bearing, weight * longer
+                        own[b, 0, _FACES] += number * fixed_faces
+                        own[b, 1, _WOOD] += wood * fixed_wood / stretch[b]
+                        bears = np.zeros_like(own[b])
+                        bears[0, _LEAVES], bears[1, _LEAVES] = still * leaves, grows * leaves
+                        bears[:2, _FACES] = still * full_faces, grows * full_faces
+                        bears[1:, _WOOD] = np.array([(1 - weight) * full, weight * more]) * full_wood / stretch[b]
+                        bears[:2, _SPURS] = still * spurs, grows * spurs
+                        own[b] += bears
+                        if sort == LATERAL:
+                            on_limbs[b] += bears
+        return cls(shaped, power, borne)
+
     def leaves(self, subplants: Branches, faces: bool = False, kinds: bool = False) -> Floats:
         """Area or number of faces (n,) of leaves of sub-plants over that of plants as described; (n, k) by kind."""
         some = _LEAF_FACES if faces else _AREA
@@ -345,70 +410,6 @@ class ShapedTotals:
 
 def _over(own: Floats, plain: Floats) -> Floats:
     return np.where(plain > 0, own / np.where(plain > 0, plain, 1.0), 1.0)
-
-
-def shaped_totals(rows: Table, totals: Averages, polygons: Floats) -> ShapedTotals:
-    """Totals of all rows.
-
-    Parameters
-    ----------
-    rows : (r,) parameter table
-    totals : Averages
-        Of plants as described.
-    polygons : (r,) float64
-        Faces of a leaf of each row.
-    """
-    every = np.arange(len(rows))
-    bearing = (rows["next"][:, (LATERAL, DEAD, FORK)] >= 0).any(axis=1)
-    solid = rows["phantom"] | rows["drawn"] | (rows["envelope"] > 0)
-    shaped = (rows["order"] == 0) & bearing & ~solid & ~crown_effects.are_stools(rows, every)
-    power, borne = np.zeros((2, len(rows), len(_BASES), 3, _TOTALS))
-    kinds = np.arange(KINDS) == rows["leaf_kind"][:, None]
-    all_leaves = np.concatenate([totals.leaf_area[:, 1] @ kinds, (totals.leaves * polygons) @ kinds], axis=1)
-    exact = rows.copy()
-    exact["taper"][:, 1] = 0
-    for i in np.flatnonzero(shaped)[::-1]:  # stems before what they grow on
-        own, on_limbs = power[i], borne[i]
-        own[:, 0, _AREA] += totals.leaf_area[i, 1, i] * kinds[i]
-        own[:, 0, _LEAF_FACES] += totals.leaves[i, i] * polygons[i] * kinds[i]
-        own[:, 0, _FACES] += totals.fixed_faces[i, i]
-        own[:, 0, _WOOD] += totals.fixed_wood[i, i]
-        trunk = np.argmax(rows["species"] == rows["species"][i])
-        below, above = crown_effects.trunk_length_factors(_BASES, rows["part"][trunk, 1])
-        stretch = above if rows["continues"][i] else below
-        for sort in np.flatnonzero(rows["next"][i] >= 0):
-            j = rows["next"][i, sort]
-            leaves = all_leaves[j]
-            fixed_faces, full_faces, fixed_wood, full_wood, spurs = (
-                getattr(totals, name)[j].sum() for name in _OF_WOOD
-            )
-            if sort in (FORK, SPUR):
-                one = children_sums(exact, i, int(sort))
-            if sort == FORK:
-                for whole, its in ((own, power[j]), (on_limbs, borne[j])):
-                    stem = its * one.number
-                    stem[:, :, _WOOD] = its[:, :, _WOOD] * one.wood * (above / stretch)[:, None]
-                    whole += stem
-            elif sort == SPUR:
-                own[:, 0, _LEAVES] += one.full * leaves
-                own[:, 0, _FACES] += one.number * fixed_faces + one.full * full_faces
-                own[:, 0, _SPURS] += one.wood * fixed_wood + one.full_wood * full_wood + one.full * spurs
-            else:
-                weight = rows["count_by_length"][j]
-                for b, base in enumerate(_BASES):
-                    number, bearing, longer, wood, full, more = _limbs(exact, int(i), int(sort), base)
-                    still, grows = (1 - weight) * bearing, weight * longer
-                    own[b, 0, _FACES] += number * fixed_faces
-                    own[b, 1, _WOOD] += wood * fixed_wood / stretch[b]
-                    bears = np.zeros_like(own[b])
-                    bears[0, _LEAVES], bears[1, _LEAVES] = still * leaves, grows * leaves
-                    bears[:2, _FACES] = still * full_faces, grows * full_faces
-                    bears[1:, _WOOD] = np.array([(1 - weight) * full, weight * more]) * full_wood / stretch[b]
-                    bears[:2, _SPURS] = still * spurs, grows * spurs
-                    own[b] += bears
-                    if sort == LATERAL:
-                        on_limbs[b] += bears
-    return ShapedTotals(shaped, power, borne)
 
 
 def _limbs(rows: Table, i: int, sort: int, base: float) -> tuple[float, ...]:

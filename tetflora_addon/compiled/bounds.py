@@ -212,7 +212,7 @@ def _unit_bound(rows: Table, index: int, bounds: Floats, raised: bool) -> Floats
 def _crown_most(row: Table, low: Floats, high: Floats) -> Floats:
     """Greatest length ratio of children between two fractions (n,) of them."""
     inner = np.linspace(low, high, 5, axis=1)
-    ratio = crown_ratio(np.full(inner.shape, row["crown"]), 1 - inner).max(axis=1)
+    ratio = crown_ratio(row["crown"], 1 - inner).max(axis=1)
     return np.minimum(ratio + _CROWN_SLOPE * (high - low) / 8, 1)
 
 

@@ -32,7 +32,7 @@ from ..growth.foliage import leaf_forms, leaf_keys, leaf_places, place_leaves, s
 from ..growth.growth import leaf_counts, open_branches, radius_at, trunks
 from ..growth.hashing import key_of_seed, mix, uniform
 from ..growth.seeds import Branches, Seeds
-from ..leaves.models import LeafModel
+from ..leaves.models import Forms, LeafModel
 from ..storage import cached
 from .averages import tube_perimeter
 
@@ -251,15 +251,9 @@ class PlantElements:
 
 
 def elements_of(
-    rows: Table,
-    forms: Sequence[Sequence[LeafModel]],
-    subplants: Branches,
-    group: Integers,
-    first: int,
-    length: Floats,
-    orders: int | None = None,
+    rows: Table, forms: Forms, subplants: Branches, group: Integers, first: int, length: Floats, orders: int = -1
 ) -> PlantElements:
-    """Grow a sub-plant to its last leaf.
+    """Grow a sub-plant to its last leaf, or so many orders of it.
 
     Parameters
     ----------
@@ -274,10 +268,10 @@ def elements_of(
         Usual length of a branch of each row at plant scale 1, meters.
     """
     parts, groups, dense = [], [], []
-    while len(subplants) and orders != 0:
+    while len(subplants) and orders:
         whole, _, subplants, _ = open_branches(rows, subplants)
         bodies, lines = whole.branches, whole.lines
-        orders = None if orders is None else orders - 1
+        orders -= 1
         ratio = np.log(np.maximum(bodies.length, 1e-12) / (bodies.scale * length[bodies.row]))
         ratio = np.clip(ratio, -WIDEST, WIDEST)
         for part, owner in (_wood(rows, bodies, lines), *_leaves(rows, forms, bodies, lines)):
@@ -297,9 +291,7 @@ def _wood(rows: Table, bodies: Branches, lines: Axes) -> tuple[WoodOutlines, Int
     return WoodOutlines(ends, radii * (tube_perimeter(rows["sides"][some.row]) / (2 * np.pi))[:, None]), owner
 
 
-def _leaves(
-    rows: Table, forms: Sequence[Sequence[LeafModel]], bodies: Branches, lines: Axes
-) -> Iterator[tuple[LeafOutlines, Integers]]:
+def _leaves(rows: Table, forms: Forms, bodies: Branches, lines: Axes) -> Iterator[tuple[LeafOutlines, Integers]]:
     counts = leaf_counts(rows, bodies)
     for row in np.unique(bodies.row[counts > 0]):
         some = np.flatnonzero((bodies.row == row) & (counts > 0))
@@ -364,12 +356,7 @@ def factors(coefficients: Floats, volumes: Floats) -> Floats:
 
 
 def fit_clumping(
-    rows: Table,
-    forms: Sequence[Sequence[Sequence[LeafModel]]],
-    area: Floats,
-    polygons: Floats,
-    width: Floats,
-    length: Floats,
+    rows: Table, forms: Sequence[Forms], area: Floats, polygons: Floats, width: Floats, length: Floats
 ) -> Clumping:
     """Fit every species.
 
@@ -395,9 +382,7 @@ def fit_clumping(
     return Clumping(np.where(total > 0, area @ own / np.where(total > 0, total, 1), own), own, root, density, usual)
 
 
-def _fitted(
-    rows: Table, forms: Sequence[Sequence[LeafModel]], every: slice, polygons: Floats, width: float, usual: Floats
-) -> Floats:
+def _fitted(rows: Table, forms: Forms, every: slice, polygons: Floats, width: float, usual: Floats) -> Floats:
     """Roots, densities and own offsets (3, r) of the rows of one species."""
     orders, group = np.unique(rows["order"][every], return_inverse=True)
     group = group.reshape(-1)
@@ -526,7 +511,7 @@ def _solved(met: Mask, depth: Floats, weight: Floats, unit: float) -> Floats:
 _PLACES = {"species", "next", "drawn_rows", "sunlit", "dead"}
 
 
-def fingerprint(rows: Table, forms: Sequence[Sequence[LeafModel]], method: int) -> str:
+def fingerprint(rows: Table, forms: Forms, method: int) -> str:
     """Hash of a species' parameters and the forms of its leaves: 16 hexadecimal digits.
 
     Parameters

@@ -21,15 +21,7 @@ from numpy.typing import NDArray
 
 from ..arrays import Floats, Integers, Mask, Table, gathered
 from ..errors import SpeciesError
-from ..growth.crown_effects import (
-    LIGHT,
-    MOST_LEANING,
-    are_stools,
-    bare_part,
-    first_forks,
-    length_factors,
-    trunk_length_factors,
-)
+from ..growth.crown_effects import LIGHT, MOST_LEANING, are_stools, bare_part, first_forks, length_factors, trunk_ratios
 from ..growth.foliage import YOUTH, envelope_reach
 from ..growth.growth import fullness
 from ..growth.rows import FORK, LATERAL, build_rows, lengths
@@ -40,17 +32,7 @@ from ..leaves.models import LeafModel
 from ..species.ages import with_habit
 from ..species.quality import with_quality
 from ..species.species import LEAF_KINDS, Species
-from .averages import (
-    Averages,
-    DayTotals,
-    RowLeaves,
-    ShapedTotals,
-    average,
-    quadratic,
-    row_leaves,
-    shaped_totals,
-    totals_of_day,
-)
+from .averages import Averages, DayTotals, RowLeaves, ShapedTotals, average, quadratic, row_leaves, totals_of_day
 from .bounds import leaf_reaches, limb_reaches, sampled_bounds, unit_bounds, widest_radii
 from .clumping import Clumping, fit_clumping
 from .orientation import Orientation, face_planes, orientation_of
@@ -244,7 +226,7 @@ class Flora:
     @_in_summer
     def shaped_totals(self) -> ShapedTotals:
         """What crown shapes change."""
-        return shaped_totals(self.rows, self.averages, self.leaf.polygons)
+        return ShapedTotals.of(self.rows, self.averages, self.leaf.polygons)
 
     def _shaped(self, subplants: Branches) -> Integers:
         """Sub-plants (k,) of (n,) whose totals crown shapes change."""
@@ -288,12 +270,12 @@ def compile_species(species: Sequence[Species]) -> Flora:
 @lru_cache(maxsize=8)
 def _compiled(species: tuple[Species, ...]) -> Flora:
     for one in species:
-        for kind, name in enumerate(LEAF_KINDS):
+        for kind in LEAF_KINDS:
             for form in one.forms(kind):
                 if not isinstance(form, LeafModel):
-                    raise SpeciesError(f'{one.identifier}: the {name} object "{form}" was not replaced with a mesh')
+                    raise SpeciesError(f'{one.identifier}: the {kind} object "{form}" was not replaced with a mesh')
     rows = build_rows(species)
-    forms = tuple(tuple(one.forms(kind) for kind in range(len(LEAF_KINDS))) for one in species)
+    forms = tuple(tuple(one.forms(kind) for kind in LEAF_KINDS) for one in species)
     leaf = row_leaves(rows, forms, np.array([[one.leaf_transmission, one.blossom_transmission] for one in species]))
     totals = average(rows, leaf)
     bound = _with_drawn(rows, unit_bounds(rows))
@@ -344,14 +326,8 @@ def _windy(flora: Flora, wind: Wind) -> Flora:
     totals = flora.averages
     rows = windy_rows(flora.rows, totals.length, totals.radius, wind)
     bound = _with_drawn(rows, unit_bounds(rows))
-    return replace(
-        flora,
-        rows=rows,
-        bound=bound,
-        widest=widest_radii(rows),
-        leaf_reach=leaf_reaches(rows, bound, flora.leaf.reach),
-        calm=flora,
-    )
+    reach = leaf_reaches(rows, bound, flora.leaf.reach)
+    return replace(flora, rows=rows, bound=bound, widest=widest_radii(rows), leaf_reach=reach, calm=flora)
 
 
 def _with_drawn(rows: Table, bound: Floats) -> Floats:
@@ -442,7 +418,7 @@ def _moved(
     start = rows["start"][row, LATERAL, 0]
     bare = np.maximum(start, bare_part(rows, row, crown[:, BASE]))
     left = (1 - bare) / np.maximum(1 - start, 1e-9)
-    below, above = trunk_length_factors(crown[:, BASE], first_forks(rows, row))
+    below, above = trunk_ratios(crown[:, BASE], first_forks(rows, row))
     stretch = np.where(rows["continues"][row], above, below)
     stool, limb, stem = are_stools(rows, row)[which], on.kind >= LIMB, (on.kind == STEM) | (on.kind == STEM_LIMB)
 

@@ -16,14 +16,14 @@ from typing import Self
 
 import numpy as np
 
-from ..arrays import GOLDEN_ANGLE, Floats, Integers, Table, columns, cross, perpendicular, spiral
+from ..arrays import Floats, Integers, Table, columns, cross, perpendicular, spiral
 from ..growth import foliage
 from ..growth.axes import Axes, axes
 from ..growth.growth import branch_counts, chosen_children, drawn_children, fullness, leaf_counts, radius_at
 from ..growth.hashing import Draw, key_of_seed, mix, thinned, uniform
 from ..growth.rows import DEAD, FORK, LATERAL, SPUR, ranged
 from ..growth.seeds import Branches
-from ..leaves.models import LeafModel
+from ..leaves.models import Forms, LeafModel
 from .averages import NODES, quadratic
 
 _PIECE = 128
@@ -125,9 +125,7 @@ def _frames_along(axis: Floats) -> Floats:
     return columns(x, cross(axis, x), axis)
 
 
-def orientation_of(
-    rows: Table, forms: Sequence[Sequence[Sequence[LeafModel]]], leaf: Floats, wood: Floats, length: Floats
-) -> Orientation:
+def orientation_of(rows: Table, forms: Sequence[Forms], leaf: Floats, wood: Floats, length: Floats) -> Orientation:
     """Orientation of every row.
 
     Parameters
@@ -153,7 +151,7 @@ def orientation_of(
         cos = 1 - 2 * (np.arange(_BRANCHES) + 0.5) / _BRANCHES
         if bool(rows["order"][i] == 0):  # most plants stand, and few lie
             cos = 1 - 2 * ((1 - cos) / 2) ** 3
-        sky = spiral(cos, np.arange(_BRANCHES), GOLDEN_ANGLE)
+        sky = spiral(cos, np.arange(_BRANCHES))
         sky[1::2] = met[thinned(len(met), len(sky[1::2]))]
         branches = _sample_branches(i, float(length[i]), sky)
         lines = axes(rows, branches)
@@ -311,7 +309,7 @@ def _own_leaves(rows: Table, branches: Branches, lines: Axes, turn: Floats, plac
     return out
 
 
-def _model_moments(rows: Table, forms: Sequence[Sequence[Sequence[LeafModel]]]) -> Floats:
+def _model_moments(rows: Table, forms: Sequence[Forms]) -> Floats:
     """Orientation moment (r, 3, 3) of the leaf that each row bears, in the leaf's own axes."""
     table = np.zeros((len(forms), max(len(one) for one in forms), 3, 3))
     for s, one in enumerate(forms):
@@ -325,7 +323,7 @@ def _model_moments(rows: Table, forms: Sequence[Sequence[Sequence[LeafModel]]]) 
 _PLANES = 32
 
 
-def face_planes(rows: Table, forms: Sequence[Sequence[Sequence[LeafModel]]]) -> Floats:
+def face_planes(rows: Table, forms: Sequence[Forms]) -> Floats:
     """Rotations (r, `_PLANES`, 3, 3) from axes of a face to those of the leaf that each row's own branch bears.
 
     The third axis is the normal of the face, the second as near as can be to the midrib. Each stands for the same area.

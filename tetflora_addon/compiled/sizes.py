@@ -13,20 +13,7 @@ from weakref import WeakKeyDictionary
 
 import numpy as np
 
-from ..arrays import (
-    GOLDEN_ANGLE,
-    GOLDEN_TURN,
-    Arrays,
-    Floats,
-    Floats32,
-    Integers,
-    Integers32,
-    Mask,
-    Table,
-    column,
-    spiral,
-    spread,
-)
+from ..arrays import GOLDEN_TURN, Arrays, Floats, Floats32, Integers, Integers32, Mask, Table, column, spiral, spread
 from ..growth.axes import Axes, axes
 from ..growth.crown_effects import MOST_LEANING, are_stools, bare_part, child_factors, lateral_fractions, length_factors
 from ..growth.foliage import envelope_reach, leaf_keys, leaf_places, place_leaves, settled
@@ -166,7 +153,7 @@ def _crown_of(species: Species) -> Crown:
 def _even_parts(crown: Crown) -> CrownParts:
     """Leaves of one polygon each, evenly in a spheroid."""
     index, none = np.arange(_PARTS), np.zeros(_PARTS, np.int64)
-    place = spiral(1.0 - (2.0 * index + 1.0) / _PARTS, index, GOLDEN_ANGLE)
+    place = spiral(1.0 - (2.0 * index + 1.0) / _PARTS, index)
     place *= np.cbrt((index * GOLDEN_TURN) % 1.0)[:, None]
     half = (crown.height - crown.base) / 2.0
     place = place * (crown.radius, crown.radius, half) + (0.0, 0.0, crown.base + half)

@@ -13,7 +13,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..arrays import GOLDEN_ANGLE, Floats, spiral
+from ..arrays import Floats, spiral
 from ..buffers import MeshBuffers
 from ..optics import PALER, THROUGH_TINT
 from .gltf import face_normals
@@ -95,4 +95,4 @@ def _sides(meshes: Sequence[MeshBuffers]) -> Floats:
 def _lamps() -> Iterator[tuple[Floats, float, float]]:
     """Directions (3,) to light, the irradiance from each of what faces it, and what of it shadows let through."""
     for z, level, passing in _LIGHT:
-        yield from ((toward, level / np.abs(z).sum(), passing) for toward in spiral(z, np.arange(len(z)), GOLDEN_ANGLE))
+        yield from ((toward, level / np.abs(z).sum(), passing) for toward in spiral(z, np.arange(len(z))))

@@ -62,7 +62,7 @@ def first_forks(rows: Table, row: Integers) -> Floats:
     return rows["part"][np.flatnonzero(np.diff(rows["species"], prepend=-1))[rows["species"]], 1][row]
 
 
-def trunk_length_factors(base: ArrayLike, fork: ArrayLike) -> tuple[Floats, Floats]:
+def trunk_ratios(base: ArrayLike, fork: ArrayLike) -> tuple[Floats, Floats]:
     """How many times as long as described trunks (...) are up to their first fork (...), and from there on."""
     fork = np.asarray(fork, np.float64)
     place = np.maximum(fork, base)
@@ -72,7 +72,7 @@ def trunk_length_factors(base: ArrayLike, fork: ArrayLike) -> tuple[Floats, Floa
 
 def length_factors(rows: Table, row: Integers, crown: Floats32) -> Floats:
     """How many times as long as described branches of rows (n,) are, which are parts of trunks; 1 for all others."""
-    below, above = trunk_length_factors(crown[:, BASE], first_forks(rows, row))
+    below, above = trunk_ratios(crown[:, BASE], first_forks(rows, row))
     return np.where(rows["order"][row] > 0, 1.0, np.where(rows["continues"][row], above, below))
 
 
@@ -111,7 +111,7 @@ def count_factors(rows: Table, row: Integers, base: ArrayLike, sort: int, start:
 def limb_count_factors(rows: Table, row: Integers, base: ArrayLike) -> Floats:
     """How many limbs (n,) the stems beyond forks have because they are shorter; 1 for all others."""
     return np.where(
-        rows["continues"][row] & (rows["order"][row] == 0), trunk_length_factors(base, first_forks(rows, row))[1], 1.0
+        rows["continues"][row] & (rows["order"][row] == 0), trunk_ratios(base, first_forks(rows, row))[1], 1.0
     )
 
 

@@ -276,13 +276,7 @@ def place_leaves(
 
 
 def leaf_frames(
-    rows: Table,
-    row: Integers,
-    frame: Floats32,
-    roll: Floats,
-    index: Integers,
-    key: Keys,
-    sky: NDArray[np.floating] | None = None,
+    rows: Table, row: Integers, frame: Floats32, roll: Floats, index: Integers, key: Keys, sky: Floats32 | None = None
 ) -> Floats32:
     """Frames (m, 3, 3) of leaves before they turn to the light.
 

@@ -86,12 +86,7 @@ class Wind:
     )
     #: Radians from +x toward +y.
     direction: float = setting(
-        0.0,
-        "Direction",
-        "Direction the wind blows toward: 0° is +X, 90° is +Y",
-        subtype='ANGLE',
-        soft_min=-np.pi,
-        soft_max=np.pi,
+        0.0, "Direction", "Where it blows to: 0° is +X, 90° is +Y", subtype='ANGLE', soft_min=-np.pi, soft_max=np.pi
     )
     gusts: float = setting(
         0.5,

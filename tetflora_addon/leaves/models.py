@@ -9,6 +9,7 @@ subdivision surfaces based on triangles", 1987). Points of spines and leaves sta
 its area. What is open, such as stalks, stays as it is. Up close spines grow from areoles, evenly over closed parts.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -171,7 +172,7 @@ def mean_silhouette(model: LeafModel) -> float:
     corners = fans(model)[1]
     number = np.arange(_DIRECTIONS)
     total = 0.0
-    for toward in spiral((number + 0.5) / _DIRECTIONS, number, GOLDEN_ANGLE):
+    for toward in spiral((number + 0.5) / _DIRECTIONS, number):
         across = perpendicular(toward[None])[0]
         flat = corners @ np.stack([across, np.cross(toward, across)], axis=1)
         low, high = flat.min(axis=(0, 1)), flat.max(axis=(0, 1))
@@ -188,6 +189,10 @@ def mean_silhouette(model: LeafModel) -> float:
         covered[x[inside], y[inside]] = True
         total += np.count_nonzero(covered) / _CELLS**2 * np.prod(high - low)
     return float(total / _DIRECTIONS)
+
+
+#: Models of a species, by kind of leaves.
+Forms = Sequence[Sequence[LeafModel]]
 
 
 def leaf_model(positions: ArrayLike, faces: list[list[int]], uv: ArrayLike | None = None) -> LeafModel:

@@ -101,7 +101,7 @@ class World:
     def of(cls, radiance: Callable[[Floats], ArrayLike]) -> Self:
         """A sky whose radiance (m, 3) in unit directions (m, 3) is known."""
         index = np.arange(SKY_POINTS) + 0.5
-        toward = spiral(1.0 - 2.0 * index / SKY_POINTS, index, GOLDEN_ANGLE)
+        toward = spiral(1.0 - 2.0 * index / SKY_POINTS, index)
         seen = np.broadcast_to(np.asarray(radiance(toward), np.float64), (SKY_POINTS, 3)) * (4.0 * np.pi / SKY_POINTS)
         part, basis = np.argmax(toward @ DIRECTIONS.T, axis=1), harmonics(toward)
         parts = np.zeros((len(DIRECTIONS), HARMONICS, 3))

@@ -130,10 +130,7 @@ class Rules(GroundLimits):
         **_ANGLE,
     )
     edge_falloff: float = setting(
-        0.0,
-        "Edge Falloff",
-        "Distance from the ground's border over which plants become sparser; 0 for none",
-        **meters(0.0, 100.0),
+        0.0, "Edge Falloff", "Distance from the border within which plants thin out; 0 for none", **meters(0.0, 100.0)
     )
     clumping: float = setting(
         0.0,
@@ -155,10 +152,7 @@ class Rules(GroundLimits):
         1.0, "Scale at Top", "Scale factor at the highest ground, relative to the lowest; 1 for no change", **_SCALE
     )
     tilt: float = setting(
-        0.0,
-        "Follow Ground",
-        "0: upright, as trees grow; 1: perpendicular to the ground, as moss and grass grow",
-        **FACTOR,
+        0.0, "Follow Ground", "0: upright, as trees grow; 1: perpendicular to the ground, as moss and grass", **FACTOR
     )
     weights: tuple[float, ...] = (1.0,)  # relative frequency of each species
     companions: tuple[Companion, ...] = ()

@@ -347,7 +347,7 @@ class SiblingGroups:
     def grown(self) -> PlantElements:
         """The real leaves and wood."""
         forms = self.flora.forms[int(self.flora.species_of(self.some.row[:1])[0])]
-        rows, orders = len(self.flora.rows), None if self.pieces is None else 1
+        rows, orders = len(self.flora.rows), -1 if self.pieces is None else 1
         return elements_of(self.flora.rows, forms, self.some, np.zeros(rows, np.intp), 0, np.ones(rows), orders)
 
     def facets(self, side: float, copies: int) -> Facets:

@@ -12,21 +12,7 @@ import numpy as np
 
 from ..arrays import Floats
 from ..leaves.models import LeafModel
-from .species import (
-    CROWN_PROFILES,
-    EVEN,
-    LEAF_KINDS,
-    Dead,
-    Order,
-    Range,
-    Species,
-    crown_ratio,
-    faded,
-    fork_cuts,
-    shortened,
-    some_nodes,
-    whole_cuts,
-)
+from .species import EVEN, Dead, Order, Range, Species, crown_ratio, faded, fork_cuts, shortened, some_nodes, whole_cuts
 
 
 @dataclass(frozen=True)
@@ -91,14 +77,14 @@ def _laterals(order: Order) -> tuple[Floats, Floats, Floats | float]:
 
 
 @lru_cache
-def _even_ratios(profile: int) -> Floats:
-    return crown_ratio(np.full(EVEN.shape, profile), 1 - EVEN)
+def _even_ratios(profile: str) -> Floats:
+    return crown_ratio(profile, 1 - EVEN)
 
 
 def _ratios(order: Order, fraction: Floats) -> Floats:
     if fraction is EVEN:  # of all that are full-grown, again and again
-        return _even_ratios(CROWN_PROFILES.index(order.crown))
-    return crown_ratio(np.full(fraction.shape, CROWN_PROFILES.index(order.crown)), 1 - fraction)
+        return _even_ratios(order.crown)
+    return crown_ratio(order.crown, 1 - fraction)
 
 
 def least_length(order: Order) -> float:
@@ -158,10 +144,10 @@ def _dead_on(dead: Dead, order: Order, i: int, cuts: list[float], fold: np.ndarr
 
 def dead_vigor(fraction: Floats) -> Floats:
     """Length ratio (n,) of dead branches from the lowest, of which half is left, to the highest."""
-    return crown_ratio(np.full(fraction.shape, CROWN_PROFILES.index("tapered")), fraction)
+    return crown_ratio("tapered", fraction)
 
 
 def leaf_polygons(species: Species, order: Order) -> float:
     """Mean polygons of the leaves that branches of an order bear."""
-    forms = species.forms(LEAF_KINDS.index(order.leaf_kind)) or species.leaf
+    forms = species.forms(order.leaf_kind) or species.leaf
     return float(np.mean([form.polygons if isinstance(form, LeafModel) else 1 for form in forms]))

@@ -20,7 +20,7 @@ from ..errors import SpeciesError
 from ..leaves.models import LeafModel
 from .catalog import MAX_POLYGONS, ORDER_KEYS
 from .members import Members, expected_members, expected_polygons
-from .species import LEAF_KINDS, QUALITY_LIMITS, Order, Range, Species
+from .species import QUALITY_LIMITS, Order, Range, Species
 
 _FEW = 12.0  # a kind with no more members than this keeps them all
 _SHAPE_PACE = 1.0  # how much sooner than members a trunk's sides and segments go; of twigs, `_TWIG_PACE` more
@@ -226,7 +226,7 @@ def _ratio(before: float, after: float) -> float:
 
 def _form_area(species: Species, order: Order) -> float:
     """Mean area of the forms of leaf that an order bears, at size 1; a form without its mesh counts as 1."""
-    forms = species.forms(LEAF_KINDS.index(order.leaf_kind)) or species.leaf
+    forms = species.forms(order.leaf_kind) or species.leaf
     return sum(form.area if isinstance(form, LeafModel) else 1.0 for form in forms) / len(forms)
 
 

@@ -101,14 +101,7 @@ def smooth_handles(control: Chains) -> tuple[Floats, Floats]:
 
 
 def nurbs_chain(
-    control: Floats,
-    weights: Floats,
-    order: int,
-    steps: int,
-    *,
-    cyclic: bool = False,
-    endpoint: bool = False,
-    bezier: bool = False,
+    control: Floats, weights: Floats, order: int, steps: int, *, cyclic: bool, endpoint: bool, bezier: bool
 ) -> Chains:
     """One NURBS spline, by the recursion of Cox and de Boor (de Boor 1972).
 

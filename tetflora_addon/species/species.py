@@ -360,12 +360,7 @@ class Order:
         Range(0, 0), -360, 360, "bend along the length; positive bends toward the parent", "degrees"
     )
     curvature_tip: float = limited(
-        ...,
-        -360,
-        360,
-        "bend of the outer half of the branch (default: same as curvature)",
-        "degrees",
-        follows="curvature",
+        ..., -360, 360, "bend of its outer half (default: same as curvature)", "degrees", follows="curvature"
     )
     attraction: Range = limited(
         Range(0, 0), -360, 360, "turn of a level branch toward the sky; negative turns down", "degrees"
@@ -381,10 +376,7 @@ class Order:
     branch_start: Range = limited(Range(0.1, 0), 0, 0.99, "part at the base without branches", "fraction of the length")
     crown: str = named("cylindrical", CROWN_PROFILES, "how the length of child branches varies along the branch")
     count_by_length: float = limited(
-        0.0,
-        0,
-        1,
-        "how much the number of branches and leaves decreases on shorter branches: 0 not at all, 1 in proportion",
+        0.0, 0, 1, "how many fewer branches and leaves shorter branches bear: 0 not at all, 1 in proportion"
     )
     forks: Range = limited(Range(0, 0), 0, 8, "number of stems that the branch forks into; 0 disables forking")
     fork_at: float = limited(0.5, 0.05, 0.95, "position of the first fork", "fraction of the length")
@@ -427,10 +419,7 @@ class Order:
     branch_color: Color = described(Color((0.16, 0.11, 0.07), (0.04, 0.03, 0.02)), "color of the bark", "linear RGB")
     leaf_color: Color = described(Color((0.08, 0.19, 0.03), (0.03, 0.06, 0.01)), "color of the leaves", "linear RGB")
     leaf_color_tip: Rgb = described(
-        ...,
-        "color of leaves at the outside of the crown (default: same as leaf_color)",
-        "linear RGB",
-        follows="leaf_color",
+        ..., "color of leaves at the crown's outside (default: same as leaf_color)", "linear RGB", follows="leaf_color"
     )
     leaf_color_young: Rgb = described(
         ...,
@@ -502,9 +491,9 @@ class Species:
     ages: Ages | None = None  # how it grows
     ecology: Ecology | None = None  # what it needs among others
 
-    def forms(self, kind: int) -> tuple[LeafModel | str, ...]:
-        """Forms of leaves of a kind, by its index in `LEAF_KINDS`; leaves where there are no blossoms."""
-        return self.blossom or self.leaf if kind else self.leaf
+    def forms(self, kind: str) -> tuple[LeafModel | str, ...]:
+        """Forms of leaves of a kind, one of `LEAF_KINDS`; leaves where there are no blossoms."""
+        return self.blossom or self.leaf if kind == "blossom" else self.leaf
 
 
 def fork_cuts(order: Order) -> list[float]:
@@ -527,13 +516,13 @@ def whole_cuts(order: Order) -> list[float]:
     return cuts[: max(sum(cut < order.growing.now - _FORKS_FROM for cut in cuts[:-1]), 1) + 1]
 
 
-def crown_ratio(shape: Integers, r: Floats) -> Floats:
+def crown_ratio(shape: Integers | str, r: Floats) -> Floats:
     """Length ratio of a child, 0 to 1.
 
     Parameters
     ----------
-    shape : (...) int
-        Index into `CROWN_PROFILES`.
+    shape : (...) int or str
+        Index into `CROWN_PROFILES`, or one of these for all.
     r : (...) float64
         1 at the lowest child, 0 at the parent's tip.
 
@@ -546,7 +535,7 @@ def crown_ratio(shape: Integers, r: Floats) -> Floats:
     """
     r = np.clip(r, 0.0, 1.0)
     return np.choose(
-        shape,
+        CROWN_PROFILES.index(shape) if isinstance(shape, str) else shape,
         [
             0.2 + 0.8 * r,
             0.2 + 0.8 * np.sin(np.pi * r),

@@ -500,10 +500,7 @@ class StandSettings:
     interval: int = script_setting(5, min=0)  # years between two records of the stand; 0 keeps the last year only
     seed: int = setting(0, "Seed", "A different seed gives a different stand")
     density: float = setting(
-        2500.0,
-        "Planted",
-        "Young plants per hectare at the beginning; 0 leaves the ground bare",
-        **within(0.0, 20_000.0),
+        2500.0, "Planted", "Young plants per hectare at the start; 0 leaves the ground bare", **within(0.0, 20_000.0)
     )
     recruits: float = setting(
         300.0,

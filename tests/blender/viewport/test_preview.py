@@ -257,12 +257,12 @@ def test_undo_keeps_levels_and_lets_go_of_what_was_frozen():
     bpy.ops.ed.undo_push(message="frozen")
     bpy.ops.ed.undo()
     scene = bpy.context.scene
-    state.bring_in_step(scene)  # as the handler does where there is a window
+    state.on_undo(scene)  # as the handler does where there is a window
     preview = state.find(scene)
     assert preview.levels is levels
     assert (preview.frozen, preview.shapes) == (None, None)
     bpy.ops.ed.redo()
-    state.bring_in_step(bpy.context.scene)
+    state.on_undo(bpy.context.scene)
     assert preview.frozen is levels.camera
 
 

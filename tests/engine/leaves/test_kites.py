@@ -69,7 +69,7 @@ def test_kites_show_what_the_model_shows(name: str) -> None:
 @pytest.mark.parametrize("name", ["spruce", "silver_fir", "larch", "scots_pine"])
 def test_planes_of_shoots_show_what_these_show_where_they_are(name: str) -> None:
     """Each copy as much as its model, from everywhere: in two triangles a plane, where models have up to 25 a face."""
-    model = load_species(name).forms(0)[0]
+    model = load_species(name).forms("leaf")[0]
     planes = leaf_planes(model)
     assert planes.triangles == 2 * planes.polygons <= 10
     assert planes.area == pytest.approx(model.shown_area, rel=5e-3)

@@ -28,6 +28,7 @@ from tetflora_addon.leaves.outlines import distance_to_links
 from tetflora_addon.leaves.surfaces import SPARSE, Needles
 from tetflora_addon.optics import GLOSS
 from tetflora_addon.species import catalog
+from tetflora_addon.species.species import LEAF_KINDS
 
 #: Polygons that no level has.
 MOST = 4000
@@ -77,7 +78,7 @@ def test_needles_hide_as_much_as_the_polygons_that_stand_for_them(species: str) 
 def test_what_counts_as_wide_shows_as_much(name: str) -> None:
     """Leaves are drawn one by one from a width on: were it the reach of needles, shoots would be far too many."""
     species = catalog.load_species(name)
-    for form in (form for kind in range(2) for form in species.forms(kind) if isinstance(form, LeafModel)):
+    for form in (form for kind in LEAF_KINDS for form in species.forms(kind) if isinstance(form, LeafModel)):
         assert form.shown_area >= 0.75 * form.width**2
 
 

@@ -21,7 +21,7 @@ from tetflora_addon.growth.rows import build_rows
 from tetflora_addon.species.catalog import ORDER_KEYS, load_species, species_from_dict
 from tetflora_addon.species.members import expected_members, expected_polygons
 from tetflora_addon.species.quality import with_quality
-from tetflora_addon.species.species import LEAF_KINDS, QUALITY_LIMITS, Range, Species
+from tetflora_addon.species.species import QUALITY_LIMITS, Range, Species
 
 KINDS = st.sampled_from(support.SPECIES)
 TOLERANCE = 0.1  # how far the expected polygons may be from those asked for, as a fraction of them
@@ -41,7 +41,7 @@ def leaf_area(species: Species) -> float:
         bearers.append((species.spur, members.spur_leaves))
     total = 0.0
     for order, number in bearers:
-        forms = species.forms(LEAF_KINDS.index(order.leaf_kind)) or species.leaf
+        forms = species.forms(order.leaf_kind) or species.leaf
         size, variation = order.leaf_size
         total += number * (size**2 + variation**2 / 3) * np.mean([form.area for form in forms])
     return total

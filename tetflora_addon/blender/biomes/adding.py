@@ -17,6 +17,7 @@ from typing import Any
 
 import bpy
 import numpy as np
+from bpy.types import Collection, Depsgraph, Object, PropertyGroup, Scene
 from mathutils import Vector
 
 from ...arrays import Floats, Integers
@@ -58,9 +59,7 @@ class BiomeResult:
 
 
 @job("Adding the biome")
-def add_biome_steps(
-    data: JobData, biome: Biome, grounds: Sequence[bpy.types.Object], seed: int = 0
-) -> Job[BiomeResult]:
+def add_biome_steps(data: JobData, biome: Biome, grounds: Sequence[Object], seed: int = 0) -> Job[BiomeResult]:
     """Add a biome to grounds, with all of its plants. Closing the steps, or an error, leaves everything as it was.
 
     Raises
@@ -112,7 +111,7 @@ def add_biome_steps(
         return (yield from _plant(data, uid, *grown))
 
 
-def _lay_on(population: bpy.types.PropertyGroup, grounds: Sequence[bpy.types.Object]) -> None:
+def _lay_on(population: PropertyGroup, grounds: Sequence[Object]) -> None:
     """Let a layer that was read grow on those of the grounds that it names or, without any, on all of them."""
     named = {entry.object for entry in population.grounds}
     own = [obj for obj in grounds if obj in named] or grounds
@@ -120,7 +119,7 @@ def _lay_on(population: bpy.types.PropertyGroup, grounds: Sequence[bpy.types.Obj
     _keep_found(population, own)
 
 
-def _keep_found(layer: bpy.types.PropertyGroup, grounds: Sequence[bpy.types.Object]) -> None:
+def _keep_found(layer: PropertyGroup, grounds: Sequence[Object]) -> None:
     """Of the masks of a layer that was read, which are those of other grounds, keep what these have."""
     if all(layer.vertex_group not in obj.vertex_groups for obj in grounds):
         layer.vertex_group = ""
@@ -129,7 +128,7 @@ def _keep_found(layer: bpy.types.PropertyGroup, grounds: Sequence[bpy.types.Obje
 
 
 @job("Planting the biome")
-def plant_biome_steps(data: JobData, biome: bpy.types.PropertyGroup) -> Job[BiomeResult]:
+def plant_biome_steps(data: JobData, biome: PropertyGroup) -> Job[BiomeResult]:
     """Plant all layers of a biome again by their settings, but frozen ones and stands of which a year is kept.
 
     Raises
@@ -203,7 +202,7 @@ def _plant(data: JobData, uid: str, stands: Sequence[tuple[str, int]], without: 
     return BiomeResult(biome.name if biome is not None else "", layers, bare, kept)
 
 
-def _own_species(scene: bpy.types.Scene, biome: Biome) -> dict[str, str]:
+def _own_species(scene: Scene, biome: Biome) -> dict[str, str]:
     """Keep the biome's own species in this file, or tell that one is nowhere; what they are called if not alike."""
     renamed = {}
     for identifier, page in pages_of(scene, biome).items():
@@ -222,13 +221,13 @@ def _own_species(scene: bpy.types.Scene, biome: Biome) -> dict[str, str]:
     return renamed
 
 
-def growing_of(scene: bpy.types.Scene, uid: str) -> list[bpy.types.Object]:
+def growing_of(scene: Scene, uid: str) -> list[Object]:
     """Those of them that have their years, and may be grown again: *Keep Year* makes a stand the artist's own."""
     return [obj for obj in stands_of(scene, uid) if has_history(obj) and not (obj.library or obj.data.library)]
 
 
 def _fill_stand(
-    layer: Mapping[str, Any], uid: str, renamed: Mapping[str, str], seed: int, stand: bpy.types.PropertyGroup
+    layer: Mapping[str, Any], uid: str, renamed: Mapping[str, str], seed: int, stand: PropertyGroup
 ) -> None:
     """Give a stand the settings of a checked layer."""
     for name in stand_settings():
@@ -241,7 +240,7 @@ def _fill_stand(
             setattr(entry, key, renamed.get(value, value) if key == "species" else value)
 
 
-def remove_biome(scene: bpy.types.Scene, biome: bpy.types.PropertyGroup) -> int:
+def remove_biome(scene: Scene, biome: PropertyGroup) -> int:
     """Remove a biome with its plants; those of frozen populations and of kept years stay. How many plants went."""
     uid, number, grown = biome.uid, 0, set(growing_of(scene, biome.uid))
     for index in [i for i, one in enumerate(scene.tetflora.layers) if one.biome == uid][::-1]:
@@ -284,7 +283,7 @@ def brook(x: Floats) -> Floats:
     return 7.0 * np.sin(np.asarray(x) / 19.0) + 3.0 * np.sin(np.asarray(x) / 7.3 + 1.0)
 
 
-def make_land(scene: bpy.types.Scene, ground: Mapping[str, Any], seed: int = 0) -> bpy.types.Object:
+def make_land(scene: Scene, ground: Mapping[str, Any], seed: int = 0) -> Object:
     """A hectare of land around the 3D cursor."""
     along = np.arange(-SIDE / 2, SIDE / 2 + 0.1, STEP)
     x, y = np.meshgrid(along, along)
@@ -295,7 +294,7 @@ def make_land(scene: bpy.types.Scene, ground: Mapping[str, Any], seed: int = 0) 
     return land
 
 
-def make_line(scene: bpy.types.Scene, name: str, grounds: Iterable[bpy.types.Object]) -> bpy.types.Collection:
+def make_line(scene: Scene, name: str, grounds: Iterable[Object]) -> Collection:
     """A collection with a curve that winds across the grounds from west to east, for biomes that follow lines."""
     corners = np.array([obj.matrix_world @ Vector(corner) for obj in grounds for corner in obj.bound_box])
     (west, south, low), (east, north, _) = corners.min(axis=0), corners.max(axis=0)
@@ -312,7 +311,7 @@ def make_line(scene: bpy.types.Scene, name: str, grounds: Iterable[bpy.types.Obj
     return made
 
 
-def lay_biome_soil(depsgraph: bpy.types.Depsgraph, grounds: Sequence[bpy.types.Object]) -> list[str]:
+def lay_biome_soil(depsgraph: Depsgraph, grounds: Sequence[Object]) -> list[str]:
     """Give ground a soil in the colors of the low plants and the litter of all biomes on it.
 
     Returns
@@ -356,9 +355,7 @@ def lay_biome_soil(depsgraph: bpy.types.Depsgraph, grounds: Sequence[bpy.types.O
     return lay_soil("Land", grounds, earth, share, turf.mean(axis=0), sheet.low, sheet.cell)
 
 
-def _low_plants(
-    depsgraph: bpy.types.Depsgraph, uid: str, sheet: Sheet
-) -> Iterable[tuple[bool, Integers, Floats, Floats]]:
+def _low_plants(depsgraph: Depsgraph, uid: str, sheet: Sheet) -> Iterable[tuple[bool, Integers, Floats, Floats]]:
     """Plants of the layers of a biome: whether they are low, their cells, what each hides, m², and its color."""
     scene = depsgraph.scene
     for population in scene.tetflora.layers:

@@ -14,6 +14,7 @@ from typing import Any
 
 import bpy
 import numpy as np
+from bpy.types import Object, PropertyGroup, Scene
 
 from ...errors import SceneError, SpeciesError, quoted
 from ...files import IDENTIFIER_RULE, is_identifier, parse_json, read_whole
@@ -152,11 +153,7 @@ def checked(data: Any, identifier: str) -> Biome:
 
 
 def biome_data(
-    scene: bpy.types.Scene,
-    populations: Iterable[bpy.types.PropertyGroup],
-    biome: bpy.types.PropertyGroup | None,
-    name: str,
-    description: str,
+    scene: Scene, populations: Iterable[PropertyGroup], biome: PropertyGroup | None, name: str, description: str
 ) -> dict[str, Any]:
     """Populations as the layers of a file, with the limits of their biome and species that only this file has."""
     data: dict[str, Any] = {"format": FORMAT, "version": FORMATS["biome"], "name": name, "description": description}
@@ -181,25 +178,25 @@ def biome_data(
     return data | {"layers": [*stands, *layers]}
 
 
-def _stand_data(stand: bpy.types.Object) -> dict[str, Any]:
+def _stand_data(stand: Object) -> dict[str, Any]:
     """What differs from a new stand."""
     group = stand.tetflora.stand
     layer = {"kind": "stand", "name": stand.name, **settings_data(group, stand_settings())}
     return layer | {"species": [settings_data(entry, STAND_ENTRY, STAND_ENTRY) for entry in group.species]}
 
 
-def active_biome(scene: bpy.types.Scene) -> bpy.types.PropertyGroup | None:
+def active_biome(scene: Scene) -> PropertyGroup | None:
     """The biome that is the active layer, or that this belongs to; None where there is none."""
     active = active_in(scene.tetflora, "layers")
     return active if active is None or active.kind == BIOME else biome_of(scene, active)
 
 
-def layers_of(scene: bpy.types.Scene, uid: str) -> list[bpy.types.PropertyGroup]:
+def layers_of(scene: Scene, uid: str) -> list[PropertyGroup]:
     """Populations of a biome, in their order."""
     return [layer for layer in scene.tetflora.layers if layer.biome == uid and layer.kind == SCATTER]
 
 
-def stands_of(scene: bpy.types.Scene, uid: str) -> list[bpy.types.Object]:
+def stands_of(scene: Scene, uid: str) -> list[Object]:
     """Fields of a biome that are stands."""
     return [obj for obj in scene.objects if is_stand(obj) and obj.tetflora.stand.biome == uid]
 
@@ -242,7 +239,7 @@ def _check_layer(where: str, layer: Any) -> None:
             raise ValueError(f'{where} has no "species"')
 
 
-def pages_of(scene: bpy.types.Scene, biome: Biome) -> dict[str, dict[str, Any]]:
+def pages_of(scene: Scene, biome: Biome) -> dict[str, dict[str, Any]]:
     """Pages of the species of a biome's own, complete.
 
     Raises
@@ -272,7 +269,7 @@ def pages_of(scene: bpy.types.Scene, biome: Biome) -> dict[str, dict[str, Any]]:
 _SIDES, _QUALITY = (320, 200), 82
 
 
-def saved_populations(scene: bpy.types.Scene) -> list[bpy.types.PropertyGroup]:
+def saved_populations(scene: Scene) -> list[PropertyGroup]:
     """What would be saved: layers of the active biome, or without one populations on the ground of the active."""
     biome = active_biome(scene)
     if biome is not None:
@@ -284,7 +281,7 @@ def saved_populations(scene: bpy.types.Scene) -> list[bpy.types.PropertyGroup]:
     return [p for p in scene.tetflora.layers if p.uid == active.uid or own & set(grounds_of(scene, p))]
 
 
-def save_biome(scene: bpy.types.Scene, name: str, description: str, picture: bool, replace: bool) -> Path:
+def save_biome(scene: Scene, name: str, description: str, picture: bool, replace: bool) -> Path:
     """Save what grows on a ground as a file of the user's folder.
 
     Parameters
@@ -327,7 +324,7 @@ def import_biome(path: Path, replace: bool) -> str:
     return path.stem
 
 
-def _last_render(scene: bpy.types.Scene, folder: Path) -> Path:
+def _last_render(scene: Scene, folder: Path) -> Path:
     """The last render as a small JPEG."""
     result = next((image for image in bpy.data.images if image.type == 'RENDER_RESULT'), None)
     path = folder / "render.png"

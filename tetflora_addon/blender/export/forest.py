@@ -9,8 +9,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-import bpy
 import numpy as np
+from bpy.types import Depsgraph, Object
 
 from ...arrays import Floats, Integers, Integers32, quaternions
 from ...camera.camera import origin_near
@@ -138,9 +138,7 @@ def forest_parts(data: JobData, sources: Sequence[Source], shown: Shown) -> Job[
     return tuple(made)
 
 
-def _forest_part(
-    depsgraph: bpy.types.Depsgraph, source: Source, variant: Integers32, scale: Floats, shown: Shown
-) -> ForestPart:
+def _forest_part(depsgraph: Depsgraph, source: Source, variant: Integers32, scale: Floats, shown: Shown) -> ForestPart:
     name, seeds, ages, sizes = source.part
     obj = source.field
     stored = {} if obj is None else stored_points(obj, depsgraph)
@@ -170,7 +168,7 @@ def _forest_part(
     )
 
 
-def _settings(field: bpy.types.Object, matrix: Floats) -> dict[str, float | int | str | list[float]]:
+def _settings(field: Object, matrix: Floats) -> dict[str, float | int | str | list[float]]:
     """What plants of a field follow from beside its points: its age and seed, and the transform as it is stored.
 
     Blender cannot find that again from a matrix without an error in the last digit.

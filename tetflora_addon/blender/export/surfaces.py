@@ -21,7 +21,6 @@ from ...export.levels import PlantLevel, corner_triangles, with_area
 from ...export.opaque import Sides, opaque, sides_of
 from ...jobs import Job, Progress
 from ...optics import GLOSS
-from ...species.species import LEAF_KINDS
 from ..attributes import image_pixels, write
 from ..compat import tree_in_use
 from ..materials.face_looks import FaceReader, MeshLayers, plan_of
@@ -227,7 +226,7 @@ def _surface(scene: bpy.types.Scene, look: _Look, folder: Path, textures: str, b
 def _material_of(scene: bpy.types.Scene, look: _Look) -> tuple[bpy.types.Material, list[str]]:
     """The material that stands for all of a kind of parts, and what is not as the artist has it."""
     species = species_for(scene, look.species)
-    forms = 1 if look.part == "bark" else len(species.forms(LEAF_KINDS.index(look.part)))
+    forms = 1 if look.part == "bark" else len(species.forms(look.part))
     every = [m for form in range(forms) for m in materials_of(scene, species, look.part, form) if m is not None]
     found = every[0]
     problems = []

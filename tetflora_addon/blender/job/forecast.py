@@ -10,8 +10,8 @@ from collections.abc import Generator
 from contextlib import suppress
 from dataclasses import replace
 
-import bpy
 import numpy as np
+from bpy.types import Mesh, Object, PointCloud, Scene, ViewLayer
 from numpy.typing import NDArray
 
 from ... import memory
@@ -43,7 +43,7 @@ _stand: Stand | None = None
 _learned = 1.0  # what refining took here last over what was expected
 
 
-def forecast(scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer) -> Estimate | None:
+def forecast(scene: Scene, view_layer: ViewLayer) -> Estimate | None:
     """What refining takes by the present settings.
 
     None without plants, where the camera cannot be used, and in a window for a moment, until crowns are known.
@@ -51,7 +51,7 @@ def forecast(scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer) -> Estimat
     return run_to_end(forecast_steps(scene, view_layer))
 
 
-def forecast_steps(scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer) -> Generator[None, None, Estimate | None]:
+def forecast_steps(scene: Scene, view_layer: ViewLayer) -> Generator[None, None, Estimate | None]:
     """The same in small steps, during which nothing may change."""
     global _layer, _stand
     depsgraph, layer = view_layer.depsgraph, (scene.session_uid, view_layer.name)
@@ -84,7 +84,7 @@ def seconds_here(expected: Estimate) -> float:
     return expected.seconds * _learned
 
 
-def forecast_text(scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer) -> str:
+def forecast_text(scene: Scene, view_layer: ViewLayer) -> str:
     """``About 12 s, 4.1 M polygons, 2.5 GB``, and in a second line which limit holds; empty where nothing can be known.
 
     As it was found last.
@@ -92,7 +92,7 @@ def forecast_text(scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer) -> st
     return _outlook.of(scene, view_layer) or ""
 
 
-def _text_for(scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer) -> Generator[None, None, str]:
+def _text_for(scene: Scene, view_layer: ViewLayer) -> Generator[None, None, str]:
     found = yield from forecast_steps(scene, view_layer)
     if found is None:
         # Plants are there, and their crowns are being looked for.
@@ -103,7 +103,7 @@ def _text_for(scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer) -> Genera
     return f"{text}\nLimited by {found.limit}" if found.limit else text
 
 
-def memory_text(scene: bpy.types.Scene) -> str:
+def memory_text(scene: Scene) -> str:
     """``Automatic: 11.7 GB`` where the artist sets no limit of memory, else that limit."""
     if (own := most_memory(scene)) > 0.0:
         return f"{own:.1f} GB by the preferences"
@@ -125,8 +125,8 @@ def polygons_text(number: float) -> str:
     return f"{number / size:{'g' if number < 10.0 * size else ',.0f'}}{unit} polygons"
 
 
-def _count(scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer) -> Generator[None, None, Stand | None]:
-    single: list[bpy.types.Object] = []
+def _count(scene: Scene, view_layer: ViewLayer) -> Generator[None, None, Stand | None]:
+    single: list[Object] = []
     parts: list[tuple[int, Floats, Floats, list[str]]] = []
     for obj in renderable_in_parts(view_layer):
         yield
@@ -159,7 +159,7 @@ def _count(scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer) -> Generator
     return Stand(*map(np.concatenate, zip(*found, strict=True)), tuple(left))
 
 
-def _in_leaf(scene: bpy.types.Scene, kind: str) -> float:
+def _in_leaf(scene: Scene, kind: str) -> float:
     """Fraction of the leaves of a kind of plant that there are on the scene's day."""
     season = season_of(scene)
     try:
@@ -176,9 +176,7 @@ def _some(number: int, most: int = _LOOKED_AT) -> Integers:
     return np.linspace(0, number - 1, min(number, most)).round().astype(np.int64)
 
 
-def _plants(
-    scene: bpy.types.Scene, plants: list[bpy.types.Object], carried: Floats
-) -> tuple[int, Floats, Floats, list[str]]:
+def _plants(scene: Scene, plants: list[Object], carried: Floats) -> tuple[int, Floats, Floats, list[str]]:
     """How many single plants there are; feet, scales and kinds of some."""
     chosen = [plants[i] for i in _some(len(plants)).tolist()]
     matrices = carried @ np.array([o.matrix_world for o in chosen], dtype=np.float64)
@@ -190,7 +188,7 @@ def _plants(
 
 
 def _aged(
-    scene: bpy.types.Scene, scale: Floats, kinds: list[str], which: Integers, ages: NDArray[np.floating]
+    scene: Scene, scale: Floats, kinds: list[str], which: Integers, ages: NDArray[np.floating]
 ) -> tuple[Floats, list[str]]:
     """Scales of plants and their kinds, by their ages."""
     sound = np.where(sound_ages(ages), ages, 0.0).astype(np.float64)
@@ -198,7 +196,7 @@ def _aged(
     return scale * taller, [named[i] for i in which.tolist()]
 
 
-def _field(scene: bpy.types.Scene, obj: bpy.types.Object, there: Integers) -> tuple[int, Floats, Floats, list[str]]:
+def _field(scene: Scene, obj: Object, there: Integers) -> tuple[int, Floats, Floats, list[str]]:
     """The same of those points (n,) of a field that are plants now, as they are stored.
 
     What nodes make of it is not known before they are evaluated.
@@ -225,7 +223,7 @@ def _field(scene: bpy.types.Scene, obj: bpy.types.Object, there: Integers) -> tu
     return number, foot, scale, species
 
 
-def _beside_others(scene: bpy.types.Scene, kind: str, tall: float, wide: float) -> str:
+def _beside_others(scene: Scene, kind: str, tall: float, wide: float) -> str:
     """The kind of a plant with a recorded height and width: with few leaves if its crown is as narrow as in a stand."""
     one = Kind.read(kind)
     crown = crown_to_draw(scene, one.species) if one.age and not one.dead else None
@@ -233,7 +231,7 @@ def _beside_others(scene: bpy.types.Scene, kind: str, tall: float, wide: float) 
     return str(replace(one, crowded=True)) if narrow and crowds(species_for(scene, one.species)) else kind
 
 
-def _ages_of(scene: bpy.types.Scene, kinds: list[str], which: Integers, tall: NDArray[np.floating]) -> Floats:
+def _ages_of(scene: Scene, kinds: list[str], which: Integers, tall: NDArray[np.floating]) -> Floats:
     """Ages (n,) at which plants of some kinds are so tall, about."""
     out = np.zeros(len(tall))
     for number, kind in enumerate(kinds):
@@ -245,7 +243,7 @@ def _ages_of(scene: bpy.types.Scene, kinds: list[str], which: Integers, tall: ND
     return out
 
 
-def stored(points: bpy.types.Mesh | bpy.types.PointCloud, name: str, chosen: Integers) -> NDArray | None:
+def stored(points: Mesh | PointCloud, name: str, chosen: Integers) -> NDArray | None:
     """An attribute of some points that is a number each; None where there is none."""
     attribute = points.attributes.get(name)
     if attribute is None or attribute.domain != 'POINT' or attribute.data_type not in {'FLOAT', 'INT'}:

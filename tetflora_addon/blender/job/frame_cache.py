@@ -11,6 +11,7 @@ from dataclasses import dataclass, fields, is_dataclass, replace
 
 import bpy
 import numpy as np
+from bpy.types import Depsgraph, PropertyGroup, Scene, ViewLayer
 
 from ...camera.camera import Camera
 from ...camera.view_cells import Around, ViewCells, cell_camera
@@ -56,10 +57,7 @@ _entries: dict[str, _Entry] = {}
 
 
 def scene_digest(
-    scene: bpy.types.Scene,
-    depsgraph: bpy.types.Depsgraph,
-    camera: Camera | None = None,
-    given: SceneContents | None = None,
+    scene: Scene, depsgraph: Depsgraph, camera: Camera | None = None, given: SceneContents | None = None
 ) -> str:
     """Digest of camera, plants, meshes, assets, occluders, lights, settings, species, materials, day and wind.
 
@@ -86,9 +84,7 @@ def scene_digest(
         slots = [[getattr(material, "name_full", "") for material in slots] for slots in given.explicit.materials]
         explicit = meshes.surfaces, meshes.surface, meshes.linear, meshes.origin, slots
     species = load_for(given.species, scene, depsgraph) if given.species else []
-    targets = {one.target: "" for one in given.places}
-    for target in targets:
-        targets[target] = digest_of(target, depsgraph)
+    targets = {target: digest_of(target, depsgraph) for target in dict.fromkeys(one.target for one in given.places)}
     places = [
         (targets[p.target], [o.name_full for o in p.owners], p.matrices, p.keys, given.looks[p.owner])
         for p in given.places
@@ -100,7 +96,7 @@ def scene_digest(
     return content.hexdigest()
 
 
-def choices(scene: bpy.types.Scene) -> list:
+def choices(scene: Scene) -> list:
     """Settings of a scene in its digest, without any object; cheap enough for every change."""
     group = scene.tetflora
     materials = [(e.species, *(getattr(getattr(e, k), "name", "") for k in REPLACED)) for e in group.output.species]
@@ -131,7 +127,7 @@ def add_to_digest(content: "hashlib._Hash", value: object) -> None:
         content.update(f"{value!r};".encode())  # or 1, 11 would be 11, 1
 
 
-def shared_camera(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, given: SceneContents | None = None) -> Camera:
+def shared_camera(scene: Scene, depsgraph: Depsgraph, given: SceneContents | None = None) -> Camera:
     """The active camera, or the one of its cell if it moves and the scene shares results between frames.
 
     Cells are larger where the contents given are far from them. Errors are those of `scene.camera.read_camera`.
@@ -143,7 +139,7 @@ def shared_camera(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, given:
     return cell_camera(camera, ViewCells(settings.cell_length, settings.cell_turn), around) or camera
 
 
-def _around(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, given: SceneContents) -> Around:
+def _around(scene: Scene, depsgraph: Depsgraph, given: SceneContents) -> Around:
     """Spheres around meshes and assets, and around plants with all branches on the way to the last twig."""
     seeds, meshes = given.seeds, None if given.explicit is None else given.explicit.meshes
     # Lengths are in meters for trunks, and in those of their parents for all others.
@@ -155,16 +151,14 @@ def _around(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, given: Scene
         reach = [np.linalg.norm(surface.positions, axis=1).max() for surface in meshes.surfaces]
         centers.append(meshes.origin)
         radii.append(np.array(reach)[meshes.surface] * meshes.largest)
-    reaches = {one.target: 0.0 for one in given.places}
-    for target in reaches:
-        reaches[target] = reach_of(target, depsgraph)
+    reaches = {target: reach_of(target, depsgraph) for target in dict.fromkeys(one.target for one in given.places)}
     for one in given.places:
         centers.append(one.matrices[:, :3, 3])
         radii.append(reaches[one.target] * np.linalg.norm(one.matrices[:, :3, :3], axis=1).max(axis=1))
     return Around(np.concatenate(centers), np.concatenate(radii))
 
 
-def camera_moves(scene: bpy.types.Scene) -> bool:
+def camera_moves(scene: Scene) -> bool:
     """Whether anything may move a scene's camera or change its lens from frame to frame.
 
     It depends on the file alone, so that a frame is refined in the same way within an animation and alone.
@@ -180,11 +174,7 @@ def camera_moves(scene: bpy.types.Scene) -> bool:
 
 
 def key_of(
-    scene: bpy.types.Scene,
-    depsgraph: bpy.types.Depsgraph,
-    layers: Sequence[bpy.types.ViewLayer],
-    camera: Camera,
-    given: SceneContents,
+    scene: Scene, depsgraph: Depsgraph, layers: Sequence[ViewLayer], camera: Camera, given: SceneContents
 ) -> str:
     """Digest of all that results for view layers depend on, with their camera and contents.
 
@@ -197,7 +187,7 @@ def key_of(
     return content.hexdigest()
 
 
-def _values(group: bpy.types.PropertyGroup) -> list[object]:
+def _values(group: PropertyGroup) -> list[object]:
     """Values of a scene's settings, except groups: `scene_digest` has those that matter."""
     found: list[object] = []
     for prop in group.bl_rna.properties:
@@ -209,7 +199,7 @@ def _values(group: bpy.types.PropertyGroup) -> list[object]:
     return found
 
 
-def stow(scene: bpy.types.Scene, wanted: Collection[str]) -> None:
+def stow(scene: Scene, wanted: Collection[str]) -> None:
     """Unlink results of a render from a scene unless they are wanted for its frame."""
     stay = {_entries[key].collection for key in wanted if key in _entries}
     away = [c for c in result_collections(scene, 'RENDER') if c.name not in stay]
@@ -223,7 +213,7 @@ def stow(scene: bpy.types.Scene, wanted: Collection[str]) -> None:
             remove_collection(scene, collection)
 
 
-def recall(scene: bpy.types.Scene, key: str) -> bpy.types.Collection | None:
+def recall(scene: Scene, key: str) -> bpy.types.Collection | None:
     """Link results of a digest to a scene again; None if there are none."""
     entry = _entries.pop(key, None)
     collection = bpy.data.collections.get((entry.collection, None)) if entry is not None else None
@@ -238,7 +228,7 @@ def recall(scene: bpy.types.Scene, key: str) -> bpy.types.Collection | None:
     return collection
 
 
-def store(scene: bpy.types.Scene, key: str, collection: bpy.types.Collection, camera: Camera) -> None:
+def store(scene: Scene, key: str, collection: bpy.types.Collection, camera: Camera) -> None:
     """Add new results of a scene, and remove the least recently used ones beyond the limit.
 
     Where the renderer of a camera's picture needs their memory, these are all that are not shown.
@@ -258,13 +248,13 @@ def store(scene: bpy.types.Scene, key: str, collection: bpy.types.Collection, ca
         _forget(scene, other)
 
 
-def hide_for(scene: bpy.types.Scene, keys: Sequence[str]) -> None:
+def hide_for(scene: Scene, keys: Sequence[str]) -> None:
     """Hide objects that results of some digests replace."""
     names = dict.fromkeys(name for key in keys if key in _entries for name in _entries[key].originals)
     hide_originals(scene, 'RENDER', [o for name in names if (o := object_named(name)) is not None])
 
 
-def clear(scene: bpy.types.Scene) -> None:
+def clear(scene: Scene) -> None:
     """Remove a scene's cached results except those in it, which are left to `refine.clear`."""
     for key in _stowed(scene):
         _forget(scene, key)
@@ -277,14 +267,14 @@ def reset() -> None:
     _entries.clear()
 
 
-def _stowed(scene: bpy.types.Scene) -> list[str]:
+def _stowed(scene: Scene) -> list[str]:
     """Digests of a scene's results that are not in it, least recently used first."""
     shown = {c.name for c in result_collections(scene, 'RENDER')}
     own = [key for key, entry in _entries.items() if entry.scene == scene.session_uid]
     return [key for key in own if _entries[key].collection not in shown]
 
 
-def _forget(scene: bpy.types.Scene, key: str) -> None:
+def _forget(scene: Scene, key: str) -> None:
     collection = bpy.data.collections.get((_entries.pop(key).collection, None))
     if collection is not None:
         remove_collection(scene, collection)

@@ -10,8 +10,8 @@ looked at always.
 from collections.abc import Generator, Iterator
 from hashlib import blake2b
 
-import bpy
 import numpy as np
+from bpy.types import Camera, Collection, Depsgraph, DepsgraphUpdate, Object, Scene, ViewLayer
 
 from ...jobs import run_to_end
 from ..assets.places import form_steps
@@ -28,12 +28,12 @@ from ..species.asset_species import asset_species
 _found: dict[tuple[int, str], tuple[int, dict[str, str]]] = {}
 
 
-def stored_contents(scene: bpy.types.Scene, layer: bpy.types.ViewLayer) -> dict[str, str]:
+def stored_contents(scene: Scene, layer: ViewLayer) -> dict[str, str]:
     """Texts that differ where what takes part does, by what to call it; those found last where nothing has changed."""
     return run_to_end(stored_contents_steps(scene, layer))
 
 
-def stored_contents_steps(scene: bpy.types.Scene, layer: bpy.types.ViewLayer) -> Generator[None, None, dict[str, str]]:
+def stored_contents_steps(scene: Scene, layer: ViewLayer) -> Generator[None, None, dict[str, str]]:
     """The same in small steps; if Blender tells of a change between two of them, what is found is good for nothing."""
     key, shown = (scene.session_uid, layer.name), {}
     for obj in in_parts(layer.objects):
@@ -44,18 +44,16 @@ def stored_contents_steps(scene: bpy.types.Scene, layer: bpy.types.ViewLayer) ->
     return _found[key][1]
 
 
-def _lineage(obj: bpy.types.Object | None) -> Iterator[bpy.types.Object]:
+def _lineage(obj: Object | None) -> Iterator[Object]:
     while obj is not None:
         yield obj
         obj = obj.parent
 
 
-def _read(
-    scene: bpy.types.Scene, layer: bpy.types.ViewLayer, shown: dict[int, bool]
-) -> Generator[None, None, dict[str, str]]:
+def _read(scene: Scene, layer: ViewLayer, shown: dict[int, bool]) -> Generator[None, None, dict[str, str]]:
     kinds, sums = set(), dict.fromkeys(("the plants", "the meshes", "the light"), 0)
 
-    def add(part: str, obj: bpy.types.Object | None, *said: object, hideable: bool = False) -> None:
+    def add(part: str, obj: Object | None, *said: object, hideable: bool = False) -> None:
         """Sums, as the order of objects is none of theirs. Nobody evaluates what is hidden, least of all after undo."""
         places = [] if obj is None else [obj.matrix_world]
         if obj is not None and (hideable or not shown.get(obj.session_uid)):
@@ -87,13 +85,13 @@ def _read(
     return {part: f"{total % 2**64:016x}" for part, total in sums.items()}
 
 
-def _concerns(update: bpy.types.DepsgraphUpdate) -> bool:
+def _concerns(update: DepsgraphUpdate) -> bool:
     datablock, moved = update.id.original, update.is_updated_transform or update.is_updated_geometry
-    told = isinstance(datablock, bpy.types.Object | bpy.types.Collection)  # that of how they look, too
-    return (moved if told else not isinstance(datablock, bpy.types.Scene | bpy.types.Camera)) and not is_ours(datablock)
+    told = isinstance(datablock, Object | Collection)  # that of how they look, too
+    return (moved if told else not isinstance(datablock, Scene | Camera)) and not is_ours(datablock)
 
 
-def _on_update(_scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
+def _on_update(_scene: Scene, depsgraph: Depsgraph) -> None:
     if _found and any(map(_concerns, depsgraph.updates)):
         _found.clear()
 

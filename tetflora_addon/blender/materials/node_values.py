@@ -11,8 +11,8 @@ Numbers are arrays (p, k), colors (3, p, k); what is the same everywhere is (1, 
 from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
-import bpy
 import numpy as np
+from bpy.types import ColorRamp, CurveMapping, Node, NodeSocket
 from mathutils import Euler
 
 from ...arrays import Floats32
@@ -22,9 +22,9 @@ Values = Floats32
 _LUMINANCE = np.array([0.2126, 0.7152, 0.0722], np.float32)
 
 
-def settings_of(table: bpy.types.ColorRamp | bpy.types.CurveMapping) -> tuple:
+def settings_of(table: ColorRamp | CurveMapping) -> tuple:
     """All that the values of a ramp or of curves follow from."""
-    if isinstance(table, bpy.types.ColorRamp):
+    if isinstance(table, ColorRamp):
         parts = [(e.position, *e.color) for e in table.elements]
         return table.interpolation, table.color_mode, table.hue_interpolation, parts
     ends = table.clip_min_x, table.clip_min_y, table.clip_max_x, table.clip_max_y
@@ -167,7 +167,7 @@ def from_hsv(color: Values) -> Values:
     return value * (1 - saturation * (1 - np.clip(np.abs(turn - 3) - 1, 0, 1)))
 
 
-Stack = tuple[bpy.types.Node, ...]  # groups that the walk is in
+Stack = tuple[Node, ...]  # groups that the walk is in
 _CURVE = 1025  # points at which ramps and curves are known
 # Means over directions of diffuse light, of Fresnel's fraction for 1.45 and 1 less the cosine; and over instances.
 _MEANS = {(kind, "Random"): 0.5 for kind in ('OBJECT_INFO', 'PARTICLE_INFO', 'HAIR_INFO')}
@@ -228,7 +228,7 @@ class NodeValues:
 
     # Shaders by type.
 
-    def shader(self, socket: bpy.types.NodeSocket, stack: Stack = ()) -> Scattered:
+    def shader(self, socket: NodeSocket, stack: Stack = ()) -> Scattered:
         """What all points do with light by the shader that feeds a socket."""
         source, stack = source_of(socket, stack)
         if source is None or not source.is_output:
@@ -242,40 +242,40 @@ class NodeValues:
         work = getattr(self, f"_shade_{node.type.lower()}", None)
         return _UNLIT if work is None else work(node, stack)
 
-    def _shade_bsdf_principled(self, node: bpy.types.Node, stack: Stack) -> Scattered:
+    def _shade_bsdf_principled(self, node: Node, stack: Stack) -> Scattered:
         color = self._tint(node, "Base Color", stack)
         glass, inside = (self._part(node, f"{name} Weight", stack) for name in ("Transmission", "Subsurface"))
         through = np.clip(np.maximum(glass, inside / 2), 0, 1)
         return _solid(np.clip(self._part(node, "Alpha", stack), 0, 1), color, through)
 
-    def _shade_eevee_specular(self, node: bpy.types.Node, stack: Stack) -> Scattered:
+    def _shade_eevee_specular(self, node: Node, stack: Stack) -> Scattered:
         gone = np.clip(self._part(node, "Transparency", stack), 0, 1)
         return _solid(1 - gone, self._tint(node, "Base Color", stack), _NONE)
 
-    def _shade_bsdf_transparent(self, node: bpy.types.Node, stack: Stack) -> Scattered:
+    def _shade_bsdf_transparent(self, node: Node, stack: Stack) -> Scattered:
         return Scattered(1 - luminance(self._tint(node, "Color", stack)), _BLACK, _NONE)
 
-    def _shade_mix_shader(self, node: bpy.types.Node, stack: Stack) -> Scattered:
+    def _shade_mix_shader(self, node: Node, stack: Stack) -> Scattered:
         if stack and stack[-1].node_tree.name.startswith(SNOW):  # looks are those without snow
             return self.shader(find_socket(node.inputs, "Shader"), stack)
         factor = np.clip(self._part(node, "Fac", stack), 0, 1)
         a, b = (self.shader(find_socket(node.inputs, key), stack) for key in ("Shader", "Shader_001"))
         return Scattered(*(x + factor * (y - x) for x, y in zip(a, b, strict=True)))
 
-    def _shade_add_shader(self, node: bpy.types.Node, stack: Stack) -> Scattered:
+    def _shade_add_shader(self, node: Node, stack: Stack) -> Scattered:
         a, b = (self.shader(find_socket(node.inputs, key), stack) for key in ("Shader", "Shader_001"))
         # Light that either lets pass straight passes; more than all of it cannot.
         return Scattered(np.clip(a.cover + b.cover - 1, 0, 1), a.color + b.color, a.through + b.through)
 
-    def _tint(self, node: bpy.types.Node, key: str, stack: Stack) -> Values:
+    def _tint(self, node: Node, key: str, stack: Stack) -> Values:
         missing = self._points.viewport.reshape(3, 1, 1)
         return np.clip(self._or_told(self.color, node, key, stack, missing), 0, 1)
 
-    def _part(self, node: bpy.types.Node, key: str, stack: Stack) -> Values:
+    def _part(self, node: Node, key: str, stack: Stack) -> Values:
         missing = np.full((1, 1), {"Alpha": 1.0, "Strength": 1.0, "Fac": 0.5}.get(key, 0.0), np.float32)
         return self._or_told(self.number, node, key, stack, missing)
 
-    def _or_told(self, read: Callable, node: bpy.types.Node, key: str, stack: Stack, missing: Values) -> Values:
+    def _or_told(self, read: Callable, node: Node, key: str, stack: Stack, missing: Values) -> Values:
         """An input; what stands for it where it needs an image that cannot be read, which is told."""
         try:
             return read(node, key, stack)
@@ -285,26 +285,26 @@ class NodeValues:
 
     # Sockets.
 
-    def number(self, node: bpy.types.Node, key: str, stack: Stack) -> Values:
+    def number(self, node: Node, key: str, stack: Stack) -> Values:
         """An input as a number (p, k)."""
         values, kind = self._input(node, key, stack)
         if values.ndim == 2:
             return values
         return values.mean(axis=0) if kind == 'VECTOR' else luminance(values)
 
-    def color(self, node: bpy.types.Node, key: str, stack: Stack) -> Values:
+    def color(self, node: Node, key: str, stack: Stack) -> Values:
         """An input as a color or vector (3, p, k)."""
         values, _ = self._input(node, key, stack)
         return np.broadcast_to(values, (3, *values.shape)) if values.ndim == 2 else values
 
-    def _input(self, node: bpy.types.Node, key: str, stack: Stack) -> tuple[Values, str]:
+    def _input(self, node: Node, key: str, stack: Stack) -> tuple[Values, str]:
         socket = find_socket(node.inputs, key)
         source, stack = source_of(socket, stack)
         if source is None or not source.is_output:  # what nothing feeds, of a group or of a node that is switched off
             return _constant(source or socket), (source or socket).type
         return self._output(source, stack), source.type
 
-    def _output(self, socket: bpy.types.NodeSocket, stack: Stack) -> Values:
+    def _output(self, socket: NodeSocket, stack: Stack) -> Values:
         node = socket.node
         if node.type == 'TEX_IMAGE':
             color, alpha = self._image(node, stack)
@@ -318,7 +318,7 @@ class NodeValues:
         with np.errstate(all="ignore"):
             return getattr(self, f"_of_{node.type.lower()}", self._unknown)(node, socket, stack)
 
-    def _image(self, node: bpy.types.Node, stack: Stack) -> tuple[Values, Values]:
+    def _image(self, node: Node, stack: Stack) -> tuple[Values, Values]:
         key = tuple(n.as_pointer() for n in (node, *stack))
         if key not in self._images:
             outer, self._scale = self._scale, 1.0
@@ -468,9 +468,7 @@ class NodeValues:
         made = np.stack([_looked_up(table[:, i : i + 1], color[i])[0] for i in range(3)])
         return color + factor * (made - color)
 
-    def _table(
-        self, of: bpy.types.ColorRamp | bpy.types.CurveMapping, value: Callable[[float], Sequence[float]]
-    ) -> Floats32:
+    def _table(self, of: ColorRamp | CurveMapping, value: Callable[[float], Sequence[float]]) -> Floats32:
         key = repr(settings_of(of))  # between two steps a node may change, or another may have its address
         if key not in self._curves:
             self._curves[key] = np.array([list(value(x)) for x in np.linspace(0, 1, _CURVE).tolist()], np.float32)
@@ -514,7 +512,7 @@ class NodeValues:
     _of_sepxyz, _of_combxyz = _of_separate_color, _of_combine_color
 
 
-def source_of(socket: bpy.types.NodeSocket, stack: Stack) -> tuple[bpy.types.NodeSocket | None, Stack]:
+def source_of(socket: NodeSocket, stack: Stack) -> tuple[NodeSocket | None, Stack]:
     """The output that feeds an input, through groups, reroutes and what is switched off, and the groups it is in.
 
     None where nothing feeds it. An input where nothing feeds that one, of a group or of a node that is switched off.
@@ -546,7 +544,7 @@ def source_of(socket: bpy.types.NodeSocket, stack: Stack) -> tuple[bpy.types.Nod
             return source, stack
 
 
-def _constant(socket: bpy.types.NodeSocket) -> Values:
+def _constant(socket: NodeSocket) -> Values:
     value = getattr(socket, "default_value", 0.0)
     if hasattr(value, "__len__"):
         return np.array(value[:3], np.float32).reshape(3, 1, 1)

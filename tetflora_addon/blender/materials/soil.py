@@ -10,6 +10,7 @@ from typing import Any
 
 import bpy
 import numpy as np
+from bpy.types import Image, Material, Object
 
 from ...arrays import Floats, srgb_of
 from ..compat import shader_tree
@@ -23,13 +24,13 @@ _PLACE, _SIZE, _MAP, _GREEN = "Soil Corner", "Soil Size", "Soil Map", "Soil Gree
 _SHOWN = 0.6  # of the brightest channel of soil in Solid shading, at least
 
 
-def is_soil(material: bpy.types.Material | None) -> bool:
+def is_soil(material: Material | None) -> bool:
     """Whether a material is one that `soil_material` made and may bring up to date."""
     return material is not None and bool(material.get(MARK)) and material.library is None
 
 
 def lay_soil(
-    name: str, grounds: Sequence[bpy.types.Object], earth: Floats, green: Floats, tint: Floats, low: Floats, cell: float
+    name: str, grounds: Sequence[Object], earth: Floats, green: Floats, tint: Floats, low: Floats, cell: float
 ) -> list[str]:
     """Give grounds a soil, see `soil_material`, of square cells, meters; names of those that keep the artist's own."""
     fits = [obj for obj in grounds if may_have_soil(obj)]
@@ -46,21 +47,15 @@ def lay_soil(
     return kept
 
 
-def may_have_soil(obj: bpy.types.Object) -> bool:
+def may_have_soil(obj: Object) -> bool:
     """Whether a ground is of this file and has no material but soil."""
     local = obj.library is None and obj.data.library is None and obj.override_library is None
     return local and all(slot.material is None or is_soil(slot.material) for slot in obj.material_slots)
 
 
 def soil_material(
-    name: str,
-    colors: Floats,
-    green: Floats,
-    tint: Floats,
-    low: Floats,
-    size: Floats,
-    material: bpy.types.Material | None = None,
-) -> bpy.types.Material:
+    name: str, colors: Floats, green: Floats, tint: Floats, low: Floats, size: Floats, material: Material | None = None
+) -> Material:
     """A material for the ground, or the soil of before with another map; what the artist changed in its nodes stays.
 
     Parameters
@@ -98,7 +93,7 @@ def soil_material(
     return material
 
 
-def _image(name: str, colors: Floats, green: Floats) -> bpy.types.Image:
+def _image(name: str, colors: Floats, green: Floats) -> Image:
     """The map: colors as the display has them, so that eight bits are enough for dark ones, and the green in alpha."""
     rows, columns = green.shape
     image = bpy.data.images.new(name, columns, rows, alpha=True)

@@ -249,10 +249,7 @@ class Stroke:
             return
         field = standing.fields[number]
         first = len(field.data.vertices)
-        c, s, none = np.cos(placement.azimuth), np.sin(placement.azimuth), np.zeros(len(keys))
-        rows = ((c, -s, none), (s, c, none), (none, none, none + 1.0))
-        frame = np.stack([np.stack(row, axis=1) for row in rows], axis=1)
-        plant_objects.add_points(field, places, frame, placement.scale, placement.species, placement.seed, species)
+        plant_objects.add_points(field, placement, species)
         standing.add(places, number, first)
 
 

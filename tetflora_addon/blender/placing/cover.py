@@ -13,8 +13,8 @@ from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Any
 
-import bpy
 import numpy as np
+from bpy.types import Object, PropertyGroup, Scene
 
 from ...arrays import Floats
 from ...errors import SceneError, TetFloraError
@@ -78,7 +78,7 @@ class CoverResult:
     bare: list[str]  # grounds that keep a material of the artist's
 
 
-def covered_population(scene: bpy.types.Scene) -> bpy.types.PropertyGroup | None:
+def covered_population(scene: Scene) -> PropertyGroup | None:
     """The population whose ground the button covers: the active one, or the one under which the active one grows."""
     active = rules.active_population(scene)
     if active is None or not active.covers:
@@ -89,9 +89,9 @@ def covered_population(scene: bpy.types.Scene) -> bpy.types.PropertyGroup | None
 @job("Covering the ground")
 def cover_steps(
     data: JobData,
-    population: bpy.types.PropertyGroup,
+    population: PropertyGroup,
     soil: bool = True,
-    grounds: Iterable[bpy.types.Object] | None = None,
+    grounds: Iterable[Object] | None = None,
     masks: Mapping[str, Any] = MappingProxyType({}),
 ) -> Job[CoverResult]:
     """Cover the ground of a population.
@@ -141,11 +141,8 @@ def cover_steps(
 
 
 def _begun(
-    data: JobData,
-    population: bpy.types.PropertyGroup,
-    grounds: Iterable[bpy.types.Object] | None = None,
-    fallen: bool = False,
-) -> Job[tuple[list[bpy.types.Object], Above]]:
+    data: JobData, population: PropertyGroup, grounds: Iterable[Object] | None = None, fallen: bool = False
+) -> Job[tuple[list[Object], Above]]:
     """See whether a population can have a cover, and measure what stands above; with its ground, or that given."""
     scene = data.scene
     yield (progress := Progress(0.0, _UNDER))
@@ -157,24 +154,20 @@ def _begun(
     return grounds, (yield from canopy_steps(progress, scene, data.depsgraph))
 
 
-def _again(data: JobData, population: bpy.types.PropertyGroup, uid: str) -> bpy.types.PropertyGroup:
+def _again(data: JobData, population: PropertyGroup, uid: str) -> PropertyGroup:
     """A population, fetched again after others may have been added; settings for new ones stay where they are."""
     return population if uid == ANYBODY else populations.still_there(data, uid)
 
 
-def cover_of(scene: bpy.types.Scene, uid: str, fallen: bool = False) -> bpy.types.PropertyGroup | None:
+def cover_of(scene: Scene, uid: str, fallen: bool = False) -> PropertyGroup | None:
     """What covers the ground of a population, or the leaves that fall on it in autumn."""
     found = (p for p in scene.tetflora.layers if p.covers == uid or (p.uid == uid and is_cover(p)))
     return next((p for p in found if (bool(p.mix) and all(e.habitat == 'FALLEN' for e in p.mix)) == fallen), None)
 
 
 def _add_cover(
-    scene: bpy.types.Scene,
-    population: bpy.types.PropertyGroup,
-    grounds: list[bpy.types.Object],
-    masks: Mapping[str, Any],
-    name: str = NAME,
-) -> bpy.types.PropertyGroup:
+    scene: Scene, population: PropertyGroup, grounds: list[Object], masks: Mapping[str, Any], name: str = NAME
+) -> PropertyGroup:
     """A population for the cover, on the same ground and within the same limits; the covered one stays active."""
     index, uid = scene.tetflora.layers_index, population.uid
     cover = populations.add_population(scene, grounds, name=name)
@@ -194,7 +187,7 @@ def _add_cover(
     return cover
 
 
-def _parts(scene: bpy.types.Scene, canopy: Canopy, above: tuple[str, ...]) -> list[Ingredient]:
+def _parts(scene: Scene, canopy: Canopy, above: tuple[str, ...]) -> list[Ingredient]:
     """Species of a cover; those of what falls are made where the file does not have them."""
     known = catalog()
     parts = [Ingredient(*one) for one in GROWN if one[0] in known]
@@ -213,7 +206,7 @@ def _shedders(canopy: Canopy, above: tuple[str, ...]) -> list[str]:
     return [above[i] for i in np.argsort(-leaves, kind="stable") if tall[i] >= _SHEDS]
 
 
-def fallen_from(scene: bpy.types.Scene, identifier: str, kind: str) -> str:
+def fallen_from(scene: Scene, identifier: str, kind: str) -> str:
     """Identifier of what falls from a species, made if the file and the catalog do not have it; empty if nothing falls.
 
     One that is there stays as it is, because it may be the artist's own.
@@ -231,7 +224,7 @@ def fallen_from(scene: bpy.types.Scene, identifier: str, kind: str) -> str:
     return name
 
 
-def _mix(cover: bpy.types.PropertyGroup, parts: list[Ingredient], area: float) -> None:
+def _mix(cover: PropertyGroup, parts: list[Ingredient], area: float) -> None:
     """Add what the mixture of a cover lacks; what it has stays as the artist left it."""
     there = {entry.species for entry in cover.mix}
     before = sum(entry.weight for entry in cover.mix)
@@ -248,12 +241,7 @@ def _mix(cover: bpy.types.PropertyGroup, parts: list[Ingredient], area: float) -
 
 
 def _lay_soil(
-    scene: bpy.types.Scene,
-    cover: bpy.types.PropertyGroup,
-    grounds: list[bpy.types.Object],
-    floor: Floor,
-    above: tuple[str, ...],
-    area: float,
+    scene: Scene, cover: PropertyGroup, grounds: list[Object], floor: Floor, above: tuple[str, ...], area: float
 ) -> list[str]:
     """Give the ground a soil in the colors of its cover; names of the grounds that keep a material of the artist's."""
     lying, growing = _strata(scene, cover, floor, above, area)
@@ -270,7 +258,7 @@ def _lay_soil(
 
 
 def _strata(
-    scene: bpy.types.Scene, cover: bpy.types.PropertyGroup, floor: Floor, above: tuple[str, ...], area: float
+    scene: Scene, cover: PropertyGroup, floor: Floor, above: tuple[str, ...], area: float
 ) -> tuple[list[Stratum], list[Stratum]]:
     """What lies on the ground, and what grows on it: in numbers as if large ground had room for all that it should."""
     weights = sum(entry.weight for entry in cover.mix) or 1.0
@@ -288,7 +276,7 @@ def _strata(
 
 
 @job("Strewing leaves")
-def strew_steps(data: JobData, population: bpy.types.PropertyGroup) -> Job[populations.PlacedPlants | None]:
+def strew_steps(data: JobData, population: PropertyGroup) -> Job[populations.PlacedPlants | None]:
     """Strew the leaves that fall in autumn under a population; None where nothing above sheds its leaves.
 
     Replaces what an earlier run made for the same population; settings changed since stay. Closing it changes nothing.
@@ -319,7 +307,7 @@ def strew_steps(data: JobData, population: bpy.types.PropertyGroup) -> Job[popul
             return (yield from steps)
 
 
-def cover_with_snow(scene: bpy.types.Scene, population: bpy.types.PropertyGroup) -> list[str]:
+def cover_with_snow(scene: Scene, population: PropertyGroup) -> list[str]:
     """Put the snow of the scene on all materials of a population's ground; names of those that had none before.
 
     Raises

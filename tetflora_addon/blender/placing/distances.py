@@ -7,8 +7,8 @@
 
 from collections.abc import Callable, Iterable
 
-import bpy
 import numpy as np
+from bpy.types import PropertyGroup, Scene
 
 from ...compiled.sizes import Crown
 from ...errors import SpeciesError
@@ -26,7 +26,7 @@ SQUARE = 100.0
 SOURCES = (('SPECIES', "Species", "From the crowns of the species", 0), ('OWN', "Own", "Set by the artist", 1))
 
 
-def weights_of(population: bpy.types.PropertyGroup) -> dict[str, float]:
+def weights_of(population: PropertyGroup) -> dict[str, float]:
     """Relative frequency of each species of a population, at least one.
 
     Raises
@@ -37,7 +37,7 @@ def weights_of(population: bpy.types.PropertyGroup) -> dict[str, float]:
     return _summed((entry.species or default_species(), entry.weight) for entry in population.mix)
 
 
-def painted_weights(scene: bpy.types.Scene) -> dict[str, float]:
+def painted_weights(scene: Scene) -> dict[str, float]:
     """Relative frequency of each species that the brush of a scene paints, at least one.
 
     Raises
@@ -60,19 +60,17 @@ def _summed(parts: Iterable[tuple[str, float]]) -> dict[str, float]:
     return weights or {default_species(): 1.0}
 
 
-def follows_species(settings: bpy.types.PropertyGroup) -> bool:
+def follows_species(settings: PropertyGroup) -> bool:
     """Whether a population or brush takes its distance from its species; cheap."""
     return settings.distance_from == 'SPECIES'
 
 
-def distance_of(settings: bpy.types.PropertyGroup) -> float:
+def distance_of(settings: PropertyGroup) -> float:
     """Distance in meters that counts for a population or brush: its own, or the one that suits its species."""
     return suggestion(settings) if follows_species(settings) else settings.min_distance
 
 
-def suggestion(
-    settings: bpy.types.PropertyGroup, find: Callable[[bpy.types.Scene, str], Crown | None] = crown_for
-) -> float | None:
+def suggestion(settings: PropertyGroup, find: Callable[[Scene, str], Crown | None] = crown_for) -> float | None:
     """Distance in meters that suits the species of a population or brush.
 
     Species are compiled at the first time, up to a tenth of a second each. None where a crown is not found.
@@ -93,7 +91,7 @@ def suggestion(
     return float(np.float32(suited))  # as Blender stores it, so that it is the same when the artist takes it over
 
 
-def choose(settings: bpy.types.PropertyGroup, by_species: bool) -> None:
+def choose(settings: PropertyGroup, by_species: bool) -> None:
     """Let a population or brush follow its species from now on, or keep the distance that it has."""
     if not by_species and follows_species(settings):
         settings.min_distance = suggestion(settings)  # what the artist sees is what there is to change

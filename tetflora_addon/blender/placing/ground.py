@@ -9,8 +9,8 @@ from collections.abc import Generator, Sequence
 from dataclasses import dataclass
 from math import inf
 
-import bpy
 import numpy as np
+from bpy.types import Depsgraph, Object, ViewLayer
 from mathutils import Vector
 
 from ...arrays import Floats
@@ -40,7 +40,7 @@ class Ground:
         Decides about modifiers and places; what is visible in its view layer is looked at.
     """
 
-    def __init__(self, depsgraph: bpy.types.Depsgraph) -> None:
+    def __init__(self, depsgraph: Depsgraph) -> None:
         self.depsgraph = depsgraph
         found = [o for o in depsgraph.view_layer.objects if o.type == 'MESH' and is_ground(o)]
         self.objects = [o for o in found if len(o.evaluated_get(depsgraph).data.polygons)]
@@ -112,7 +112,7 @@ class Ground:
                 out[i] = hit[0].z
         return out
 
-    def _candidates(self, origin: Vector, direction: Vector) -> list[bpy.types.Object]:
+    def _candidates(self, origin: Vector, direction: Vector) -> list[Object]:
         if len(self.objects) <= _FEW:
             return self.objects
         start, along = np.array(origin), np.array(direction)
@@ -124,7 +124,7 @@ class Ground:
         return [self.objects[i] for i in np.flatnonzero((enter <= leave) & (leave >= 0.0)).tolist()]
 
 
-def is_ground(obj: bpy.types.Object) -> bool:
+def is_ground(obj: Object) -> bool:
     """Whether plants can stand on an object: visible, and neither a plant or its model, nor a result, nor refined."""
     group = obj.tetflora
     if group.is_plant or group.is_field or group.is_explicit or is_ours(obj):
@@ -145,9 +145,7 @@ class DropResult:
 
 
 @job("Dropping plants")
-def drop_steps(
-    data: JobData, plants: Sequence[bpy.types.Object], fields: Sequence[bpy.types.Object]
-) -> Job[DropResult]:
+def drop_steps(data: JobData, plants: Sequence[Object], fields: Sequence[Object]) -> Job[DropResult]:
     """Move plants vertically to the nearest ground; children move with their parents before they fall themselves.
 
     What is visible in the view layer is ground.
@@ -183,7 +181,7 @@ def drop_steps(
     return DropResult(moved, int(np.isnan(heights).sum()))
 
 
-def _drop_plants(view_layer: bpy.types.ViewLayer, plants: Sequence[bpy.types.Object], heights: Floats) -> int:
+def _drop_plants(view_layer: ViewLayer, plants: Sequence[Object], heights: Floats) -> int:
     """Move plants that are objects to heights (n,); how many moved."""
     now = np.array([o.matrix_world.translation.z for o in plants], dtype=np.float64)
     fall = np.flatnonzero(np.abs(heights - now) > _STAYS)
@@ -198,11 +196,11 @@ def _drop_plants(view_layer: bpy.types.ViewLayer, plants: Sequence[bpy.types.Obj
     return len(fall)
 
 
-def _depth(obj: bpy.types.Object) -> int:
+def _depth(obj: Object) -> int:
     return 0 if obj.parent is None else 1 + _depth(obj.parent)
 
 
-def _drop_field(field: bpy.types.Object, heights: Floats) -> int:
+def _drop_field(field: Object, heights: Floats) -> int:
     """Move the points of an editable field to heights (n,); how many moved."""
     stored, places = read(field.data, "position"), positions(field)
     world = np.array(field.matrix_world, dtype=np.float64)

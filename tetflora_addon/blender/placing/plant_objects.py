@@ -11,10 +11,11 @@ from collections.abc import Generator, Iterable, Sequence
 
 import bpy
 import numpy as np
+from bpy.types import Collection, Depsgraph, Mesh, Object, Scene
 from mathutils import Matrix, Quaternion
 from numpy.typing import NDArray
 
-from ...arrays import Floats, Integers32, Mask, quaternions
+from ...arrays import Floats, Mask, quaternions
 from ...errors import SceneError
 from ...jobs import run_to_end
 from ...planting.places import Placement, new_seeds
@@ -37,19 +38,21 @@ PAINTED_MARK = "tetflora_painted"  # on the field that painted plants go to
 _MARK = "tetflora_plants"  # on the collection, so that it may be renamed
 _BATCH = 300  # empties of one step, ten milliseconds
 _FEW = 1000  # plants that may get their names the way Blender does it
+#: Where plants go; None for the scene's collection for plants.
+Home = Collection | None
 
 
-def plants_of(objects: Iterable[bpy.types.Object]) -> list[bpy.types.Object]:
+def plants_of(objects: Iterable[Object]) -> list[Object]:
     """Those of the objects that are single plants; `fields_of` finds fields."""
     return [o for o in objects if o.tetflora.is_plant]
 
 
-def plant_collections(scene: bpy.types.Scene) -> list[bpy.types.Collection]:
+def plant_collections(scene: Scene) -> list[Collection]:
     """The scene's collections for plants that are there."""
     return [c for c in scene.collection.children_recursive if c.get(_MARK) and not (c.library or c.override_library)]
 
 
-def plant_collection(scene: bpy.types.Scene) -> bpy.types.Collection:
+def plant_collection(scene: Scene) -> Collection:
     """The scene's collection for plants; made if there is none."""
     if found := plant_collections(scene):
         return found[0]
@@ -60,14 +63,14 @@ def plant_collection(scene: bpy.types.Scene) -> bpy.types.Collection:
     return collection
 
 
-def next_seed(scene: bpy.types.Scene) -> int:
+def next_seed(scene: Scene) -> int:
     """Seed of the next plant added to a scene: another one each time, but the same when a script runs again."""
     return int(new_seeds(np.array([len(plants_of(scene.objects))]))[0])
 
 
 def add_plant(
-    scene: bpy.types.Scene, position: Sequence[float], azimuth: float, scale: float, seed: int, species: str
-) -> list[bpy.types.Object]:
+    scene: Scene, position: Sequence[float], azimuth: float, scale: float, seed: int, species: str
+) -> list[Object]:
     """Make the empty of one plant, with its trunk's base at a position in world space; a list of it."""
     placement = Placement(
         position=np.array([position], dtype=np.float64),
@@ -81,12 +84,8 @@ def add_plant(
 
 
 def add_plants_steps(
-    scene: bpy.types.Scene,
-    placement: Placement,
-    species: Sequence[str],
-    collection: bpy.types.Collection | None = None,
-    ages: np.ndarray | None = None,
-) -> Generator[list[bpy.types.Object], object, list[bpy.types.Object]]:
+    scene: Scene, placement: Placement, species: Sequence[str], collection: Home = None, ages: Floats | None = None
+) -> Generator[list[Object], object, list[Object]]:
     """Make the empties of a placement.
 
     Parameters
@@ -119,13 +118,13 @@ def add_plants_steps(
 
 
 def _empties_steps(
-    scene: bpy.types.Scene,
+    scene: Scene,
     rows: Sequence[np.ndarray],
     species: Sequence[str],
-    forms: Sequence[bpy.types.Object | None],
-    collection: bpy.types.Collection | None = None,
-    ages: np.ndarray | None = None,
-) -> Generator[list[bpy.types.Object], object, list[bpy.types.Object]]:
+    forms: Sequence[Object | None],
+    collection: Home = None,
+    ages: Floats | None = None,
+) -> Generator[list[Object], object, list[Object]]:
     """One empty for each row of places, XYZ Euler angles, scales, numbers of kinds and seeds."""
     known = catalog()
     names = _numbered([known[s].name if s in known else s for s in species], rows[3])
@@ -154,23 +153,19 @@ def _empties_steps(
     return made
 
 
-def _set_at_once(objects: Sequence[bpy.types.Object], rows: Sequence[np.ndarray], heights: np.ndarray) -> None:
+def _set_at_once(objects: Sequence[Object], rows: Sequence[np.ndarray], heights: np.ndarray) -> None:
     """Give new empties their places and looks.
 
     What is set object by object makes Blender slow when it deletes them later: 10,000 take several times as long as
     with ``foreach_set``, which needs a collection that holds these and nothing else.
     """
     position, angles, scale, *_ = rows
-    arrow = bpy.types.Object.bl_rna.properties["empty_display_type"].enum_items['SINGLE_ARROW'].value
+    arrow = Object.bl_rna.properties["empty_display_type"].enum_items['SINGLE_ARROW'].value
     within = bpy.data.collections.new(COLLECTION)
     for obj in objects:
         within.objects.link(obj)
-    for name, values in (
-        ("location", position),
-        ("rotation_euler", angles),
-        ("scale", np.repeat(scale, 3)),
-        ("empty_display_size", heights),
-    ):
+    names = ("location", "rotation_euler", "scale", "empty_display_size")
+    for name, values in zip(names, (position, angles, np.repeat(scale, 3), heights), strict=True):
         within.objects.foreach_set(name, np.ascontiguousarray(values, dtype=np.float32).reshape(-1))
     within.objects.foreach_set("empty_display_type", np.full(len(objects), arrow, np.int32))
     bpy.data.collections.remove(within)
@@ -190,12 +185,8 @@ def _numbered(names: Sequence[str], kinds: np.ndarray) -> list[str]:
 
 
 def add_field(
-    scene: bpy.types.Scene,
-    placement: Placement,
-    species: Sequence[str],
-    collection: bpy.types.Collection | None = None,
-    ages: np.ndarray | None = None,
-) -> bpy.types.Object:
+    scene: Scene, placement: Placement, species: Sequence[str], collection: Home = None, ages: Floats | None = None
+) -> Object:
     """Make one field of the plants of a placement.
 
     Parameters
@@ -211,12 +202,7 @@ def add_field(
     return link_field(scene, fields.write_field(FIELD, *rows, species, ages=ages), collection)
 
 
-def field_from_plants(
-    scene: bpy.types.Scene,
-    depsgraph: bpy.types.Depsgraph,
-    plants: Iterable[bpy.types.Object],
-    collection: bpy.types.Collection | None = None,
-) -> bpy.types.Object:
+def field_from_plants(scene: Scene, depsgraph: Depsgraph, plants: Iterable[Object], collection: Home = None) -> Object:
     """Put a field in place of plants that are objects; the same individuals stand at the same places.
 
     Parameters
@@ -240,12 +226,8 @@ def field_from_plants(
 
 
 def plants_from_field(
-    scene: bpy.types.Scene,
-    depsgraph: bpy.types.Depsgraph,
-    field: bpy.types.Object,
-    most: int,
-    collection: bpy.types.Collection | None = None,
-) -> list[bpy.types.Object]:
+    scene: Scene, depsgraph: Depsgraph, field: Object, most: int, collection: Home = None
+) -> list[Object]:
     """Put empties in place of a field; the same individuals stand at the same places.
 
     Recorded sizes become ages and scales; empties have no crown shapes.
@@ -278,7 +260,7 @@ def plants_from_field(
     return made
 
 
-def remove_fields(objects: Iterable[bpy.types.Object], tidy: bool = True) -> int:
+def remove_fields(objects: Iterable[Object], tidy: bool = True) -> int:
     """Delete fields that TetFlora made; others keep their object and lose the mark. How many plants they stored.
 
     Parameters
@@ -299,9 +281,7 @@ def remove_fields(objects: Iterable[bpy.types.Object], tidy: bool = True) -> int
     return number
 
 
-def link_field(
-    scene: bpy.types.Scene, field: bpy.types.Object, collection: bpy.types.Collection | None = None
-) -> bpy.types.Object:
+def link_field(scene: Scene, field: Object, collection: Home = None) -> Object:
     """Put a field that TetFlora made into a collection; the scene's for plants if not given."""
     field.tetflora.version, field[FIELD_MARK] = VERSION, True
     (collection or plant_collection(scene)).objects.link(field)
@@ -311,7 +291,7 @@ def link_field(
     return field
 
 
-def note_field(scene: bpy.types.Scene, field: bpy.types.Object) -> None:
+def note_field(scene: Scene, field: Object) -> None:
     """Let a field be a layer of its scene, below the others; it becomes the active one."""
     layers = scene.tetflora.layers
     if all(layer.field != field for layer in layers):
@@ -321,7 +301,7 @@ def note_field(scene: bpy.types.Scene, field: bpy.types.Object) -> None:
         scene.tetflora.layers_index = len(layers) - 1
 
 
-def prepare_scene(scene: bpy.types.Scene) -> None:
+def prepare_scene(scene: Scene) -> None:
     """Settings that a scene with plants needs.
 
     Refinement changes the scene while it renders; a window that is not locked would draw that data and could crash.
@@ -330,7 +310,7 @@ def prepare_scene(scene: bpy.types.Scene) -> None:
     scene.tetflora.version = VERSION
 
 
-def show_age(plant: bpy.types.Object) -> None:
+def show_age(plant: Object) -> None:
     """Let the arrow of a plant be as tall as its age makes it."""
     group = plant.tetflora
     if group.is_plant and plant.type == 'EMPTY' and plant.library is None:
@@ -338,7 +318,7 @@ def show_age(plant: bpy.types.Object) -> None:
         plant.empty_display_size = display_height(group.species) * ratio
 
 
-def assign_species(objects: Iterable[bpy.types.Object], identifier: str) -> int:
+def assign_species(objects: Iterable[Object], identifier: str) -> int:
     """Make plants belong to a species; how many were changed. Their seeds stay."""
     changed, height = [o for o in plants_of(objects) if o.tetflora.species != identifier], display_height(identifier)
     for obj in changed:
@@ -350,7 +330,7 @@ def assign_species(objects: Iterable[bpy.types.Object], identifier: str) -> int:
     return len(changed)
 
 
-def reseed(objects: Iterable[bpy.types.Object], roll: int = 0) -> int:
+def reseed(objects: Iterable[Object], roll: int = 0) -> int:
     """Give plants other seeds; how many there were. The same roll of the same plants gives the same seeds."""
     plants = sorted(plants_of(objects), key=lambda o: o.name_full)
     # Copies made by duplicating have equal seeds and shall part, so the place among the plants takes part.
@@ -360,7 +340,7 @@ def reseed(objects: Iterable[bpy.types.Object], roll: int = 0) -> int:
     return len(plants)
 
 
-def remove_plants(objects: Iterable[bpy.types.Object]) -> int:
+def remove_plants(objects: Iterable[Object]) -> int:
     """Delete plants from the file, and the collection for plants if that leaves it empty; how many there were."""
     plants = [o for o in plants_of(objects) if o.library is None]
     bpy.data.batch_remove(plants)
@@ -381,7 +361,7 @@ FIELD_MARK = "tetflora_field"  # on the objects of fields that TetFlora made and
 Points = dict[str, tuple[str, NDArray]]
 
 
-def editable(obj: bpy.types.Object) -> bool:
+def editable(obj: Object) -> bool:
     """Whether points of a field can be taken and added: it is of TetFlora's making, and still as simple."""
     return (
         bool(obj.get(FIELD_MARK))
@@ -401,38 +381,27 @@ def editable(obj: bpy.types.Object) -> bool:
     )
 
 
-def positions(obj: bpy.types.Object) -> Floats:
+def positions(obj: Object) -> Floats:
     """Where the points of an editable field are in world space, (n, 3), without reading what grows there."""
     world = np.array(obj.matrix_world, dtype=np.float64)
     return read(obj.data, "position") @ world[:3, :3].T + world[:3, 3]
 
 
-def take_points(obj: bpy.types.Object, keep: Mask) -> None:
+def take_points(obj: Object, keep: Mask) -> None:
     """Keep some of a field's points, (n,) bool, with all their attributes."""
     points = {name: (kind, values[keep]) for name, (kind, values) in _points(obj.data).items()}
     _write(obj, points, int(keep.sum()))
 
 
-def add_points(
-    obj: bpy.types.Object,
-    position: Floats,
-    frame: Floats,
-    scale: Floats,
-    kinds: Integers32,
-    seed: Integers32,
-    species: Sequence[str],
-) -> None:
-    """Add plants to a field, at the end; other attributes of theirs are zero.
+def add_points(obj: Object, placement: Placement, species: Sequence[str]) -> None:
+    """Add upright plants to a field, at the end; other attributes of theirs are zero.
 
     Parameters
     ----------
     obj : bpy.types.Object
         `editable`.
-    position, frame, scale : (n, 3), (n, 3, 3), (n,) float64
-        In world space.
-    kinds : (n,) int32
-        Index into ``species``.
-    seed : (n,) int32
+    placement : Placement
+        In world space; its species are an index into ``species``.
     species : sequence of str
         Identifiers; those that the field's list lacks are added to it.
     """
@@ -445,12 +414,14 @@ def add_points(
     world = np.array(obj.matrix_world, dtype=np.float64)
     size = float(np.cbrt(abs(np.linalg.det(world[:3, :3]))))
     turn = np.array(obj.matrix_world.to_3x3().normalized(), dtype=np.float64)
+    c, s, none = np.cos(placement.azimuth), np.sin(placement.azimuth), np.zeros(len(placement))
+    frame = np.stack([c, -s, none, s, c, none, none, none, none + 1.0], axis=1).reshape(-1, 3, 3)
     own = {
-        "position": (position - world[:3, 3]) @ np.linalg.inv(world[:3, :3]).T,
+        "position": (placement.position - world[:3, 3]) @ np.linalg.inv(world[:3, :3]).T,
         "rotation": quaternions(turn.T @ frame),
-        "scale": np.asarray(scale) / size,
-        "species": numbers[kinds],
-        "seed": np.asarray(seed),
+        "scale": placement.scale / size,
+        "species": numbers[placement.species],
+        "seed": placement.seed,
     }
     points, before = _points(obj.data), len(obj.data.vertices)
     for name, kind in fields.FIELD_ATTRIBUTES.items():
@@ -458,12 +429,12 @@ def add_points(
             points[name] = (kind, np.full((before, *own[name].shape[1:]), name == "scale", KINDS[kind].dtype))
     joined: Points = {}
     for name, (kind, values) in points.items():
-        new = own.get(name, np.zeros((len(seed), *values.shape[1:])))
+        new = own.get(name, np.zeros((len(placement), *values.shape[1:])))
         joined[name] = (kind, np.concatenate([values, new.astype(values.dtype)]))
-    _write(obj, joined, before + len(seed))
+    _write(obj, joined, before + len(placement))
 
 
-def assign_field_species(obj: bpy.types.Object, identifier: str) -> bool:
+def assign_field_species(obj: Object, identifier: str) -> bool:
     """Make all plants of a field belong to a species; whether that changed anything. Forms and seeds stay."""
     group = obj.tetflora
     if obj.library is not None:
@@ -477,20 +448,20 @@ def assign_field_species(obj: bpy.types.Object, identifier: str) -> bool:
     return bool(changed)
 
 
-def reseed_field(obj: bpy.types.Object, place: int, roll: int) -> None:
+def reseed_field(obj: Object, place: int, roll: int) -> None:
     """Make other individuals of all plants of a field, by the number that joins all of their seeds."""
     group = obj.tetflora
     group.seed = int(new_seeds(np.array([group.seed + (place << 32)], np.int64), roll)[0]) or 1
 
 
-def own_mesh(obj: bpy.types.Object) -> bpy.types.Mesh:
+def own_mesh(obj: Object) -> Mesh:
     """The mesh of a field, to be changed: a copy of its own where a linked duplicate shares it."""
     if obj.data.users > 1:
         obj.data = obj.data.copy()
     return obj.data
 
 
-def _join_equal_kinds(obj: bpy.types.Object) -> None:
+def _join_equal_kinds(obj: Object) -> None:
     """Let a field's list name each kind once."""
     entries = obj.tetflora.field_species
     kinds = [kind_of_choice(entry) for entry in entries]
@@ -510,7 +481,7 @@ def _join_equal_kinds(obj: bpy.types.Object) -> None:
     obj.data.update()
 
 
-def _points(mesh: bpy.types.Mesh) -> Points:
+def _points(mesh: Mesh) -> Points:
     out: Points = {}
     for attribute in mesh.attributes:
         if attribute.domain != 'POINT' or attribute.is_internal:
@@ -519,7 +490,7 @@ def _points(mesh: bpy.types.Mesh) -> Points:
     return out
 
 
-def _write(obj: bpy.types.Object, points: Points, number: int) -> None:
+def _write(obj: Object, points: Points, number: int) -> None:
     mesh = own_mesh(obj)
     mesh.clear_geometry()
     mesh.vertices.add(number)

@@ -7,12 +7,13 @@ A copy made by hand has its original's number: the oldest with a number is the p
 """
 
 import uuid
-from collections.abc import Collection, Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 
 import bpy
 import numpy as np
+from bpy.types import Collection, Depsgraph, Object, Scene
 
 from ...arrays import Floats32
 from ...errors import SceneError
@@ -40,7 +41,7 @@ NAME = "Scatter"
 class PlacedPlants:
     """The plants that placing a population made."""
 
-    objects: list[bpy.types.Object]  # in the order of the placement, or one field
+    objects: list[Object]  # in the order of the placement, or one field
     number: int
     wanted: int
     reason: str  # why there are fewer than wanted; empty if there are not
@@ -48,7 +49,7 @@ class PlacedPlants:
     erased: int  # plants omitted where the brush has erased
 
 
-def owner_of(scene: bpy.types.Scene, objects: Iterable[bpy.types.Object]) -> TetFloraLayer | None:
+def owner_of(scene: Scene, objects: Iterable[Object]) -> TetFloraLayer | None:
     """The population that all of these plants and fields belong to; None if there is no such one."""
     objects = set(objects)
     uids = {o.tetflora.population for o in objects}
@@ -56,14 +57,14 @@ def owner_of(scene: bpy.types.Scene, objects: Iterable[bpy.types.Object]) -> Tet
     return found if found is not None and objects <= set(own_objects(scene, found)) else None
 
 
-def adopt(scene: bpy.types.Scene, population: TetFloraLayer, objects: Iterable[bpy.types.Object]) -> None:
+def adopt(scene: Scene, population: TetFloraLayer, objects: Iterable[Object]) -> None:
     """Let plants and fields belong to a population, after those that it has."""
     numbers = [o.tetflora.population_number for o in own_objects(scene, population)]
     for number, obj in enumerate(objects, max(numbers, default=-1) + 1):
         obj.tetflora.population, obj.tetflora.population_number = population.uid, number
 
 
-def add_population(scene: bpy.types.Scene, grounds: Iterable[bpy.types.Object] = (), name: str = NAME) -> TetFloraLayer:
+def add_population(scene: Scene, grounds: Iterable[Object] = (), name: str = NAME) -> TetFloraLayer:
     """Add a population without plants, with the scene's settings for new ones, and make it the active one.
 
     Parameters
@@ -83,18 +84,18 @@ def add_population(scene: bpy.types.Scene, grounds: Iterable[bpy.types.Object] =
     return population
 
 
-def own_objects(scene: bpy.types.Scene, population: TetFloraLayer) -> list[bpy.types.Object]:
+def own_objects(scene: Scene, population: TetFloraLayer) -> list[Object]:
     """Plants and fields that belong to a population, in the order of their numbers."""
     return _sorted_out(scene, population)[0]
 
 
-def own_number(objects: Iterable[bpy.types.Object]) -> int:
+def own_number(objects: Iterable[Object]) -> int:
     """How many plants there are in plants and fields."""
     return sum(stored_size(o) if o.tetflora.is_field else 1 for o in objects)
 
 
 @job("Placing plants")
-def make_plants_steps(data: JobData, population: TetFloraLayer, later: Collection[str] = ()) -> Job[PlacedPlants]:
+def make_plants_steps(data: JobData, population: TetFloraLayer, later: Sequence[str] = ()) -> Job[PlacedPlants]:
     """Place a population's plants by its settings, in place of those that it has.
 
     Closing it, or an error, changes nothing. Plants of populations that are planted later keep nobody away.
@@ -128,7 +129,7 @@ def make_plants_steps(data: JobData, population: TetFloraLayer, later: Collectio
     own, copies = _sorted_out(scene, population)
     returned = max(population.made - own_number(own), 0)
     field = makes_field(population, len(placement)) and len(placement)
-    made: list[bpy.types.Object] = []
+    made: list[Object] = []
     ages = None
     if population.age > 0.0:
         ages = np.minimum(plant_ages(placement.seed, population.age, population.age_spread), np.float32(MOST_YEARS))
@@ -163,12 +164,8 @@ def still_there(data: JobData, uid: str) -> TetFloraLayer:
 
 
 def _new_plants(
-    scene: bpy.types.Scene,
-    placement: Placement,
-    species: tuple[str, ...],
-    collection: bpy.types.Collection,
-    ages: Floats32 | None,
-) -> Job[list[bpy.types.Object]]:
+    scene: Scene, placement: Placement, species: Sequence[str], collection: Collection, ages: Floats32 | None
+) -> Job[list[Object]]:
     """Plants where none have to go before."""
     steps, made = plant_objects.add_plants_steps(scene, placement, species, collection, ages), []
     try:
@@ -184,7 +181,7 @@ def _new_plants(
 
 
 def reroll_steps(
-    scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, population: TetFloraLayer, later: Collection[str] = ()
+    scene: Scene, depsgraph: Depsgraph, population: TetFloraLayer, later: Sequence[str] = ()
 ) -> Job[PlacedPlants]:
     """Place a population anew with another seed, which follows from the one that it has.
 
@@ -196,7 +193,7 @@ def reroll_steps(
         return (yield from make_plants_steps(scene, depsgraph, population, later))
 
 
-def remove_layer(scene: bpy.types.Scene, index: int, keep_plants: bool = False) -> int:
+def remove_layer(scene: Scene, index: int, keep_plants: bool = False) -> int:
     """Remove a layer; its plants go with it, unless they are frozen or shall be kept. How many went.
 
     What stays is the artist's own.
@@ -218,7 +215,7 @@ def remove_layer(scene: bpy.types.Scene, index: int, keep_plants: bool = False) 
 
 
 @contextmanager
-def restored(scene: bpy.types.Scene) -> Iterator[None]:
+def restored(scene: Scene) -> Iterator[None]:
     """Where what is done ends early, forget new layers and species, and what was set for them."""
     group = scene.tetflora
     before = {layer.uid: (len(layer.mix), layer.density, layer.seed) for layer in group.layers}
@@ -256,15 +253,13 @@ def refuse_frozen(population: TetFloraLayer) -> None:
         raise SceneError(f'"{population.name}" is frozen and keeps its plants; turn off Freeze to change it')
 
 
-def _sorted_out(
-    scene: bpy.types.Scene, population: TetFloraLayer
-) -> tuple[list[bpy.types.Object], list[bpy.types.Object]]:
+def _sorted_out(scene: Scene, population: TetFloraLayer) -> tuple[list[Object], list[Object]]:
     """A population's own plants and fields by number, and copies of them that the artist made."""
     uid = population.uid
     marked = [o for o in scene.objects if o.tetflora.population == uid] if uid else []
     marked = [o for o in marked if o.library is None and o.override_library is None]
     marked = [o for o in marked if o.tetflora.is_plant or o.tetflora.is_field]
-    own: dict[int, bpy.types.Object] = {}
+    own: dict[int, Object] = {}
     copies = []
     for obj in sorted(marked, key=lambda o: o.session_uid):
         if own.setdefault(obj.tetflora.population_number, obj) is not obj:
@@ -272,21 +267,21 @@ def _sorted_out(
     return [own[number] for number in sorted(own)], copies
 
 
-def _release(objects: Iterable[bpy.types.Object]) -> None:
+def _release(objects: Iterable[Object]) -> None:
     """Make plants the artist's own."""
     for obj in objects:
         obj.tetflora.property_unset("population")
         obj.tetflora.property_unset("population_number")
 
 
-def _remove(objects: Iterable[bpy.types.Object]) -> None:
+def _remove(objects: Iterable[Object]) -> None:
     objects = list(objects)
     plants, fields = plant_objects.plants_of(objects), fields_of(objects)
     plant_objects.remove_fields(fields, tidy=False)  # the collection keeps what the artist set for it
     bpy.data.batch_remove(plants)
 
 
-def collection_of(scene: bpy.types.Scene, population: TetFloraLayer) -> bpy.types.Collection:
+def collection_of(scene: Scene, population: TetFloraLayer) -> Collection:
     """The collection of a population's plants, within the scene's for plants; made if there is none in the scene."""
     found = population.collection
     if found is None or found.library is not None or found not in set(scene.collection.children_recursive):
@@ -297,7 +292,7 @@ def collection_of(scene: bpy.types.Scene, population: TetFloraLayer) -> bpy.type
     return found
 
 
-def _dissolve(scene: bpy.types.Scene, collection: bpy.types.Collection | None) -> None:
+def _dissolve(scene: Scene, collection: Collection | None) -> None:
     """Take a population's collection away; what else lies in it goes up to the scene's collection for plants."""
     if collection is None or collection.library is not None:
         return

@@ -5,7 +5,7 @@
 from functools import partial
 from math import pi
 
-import bpy
+from bpy.types import Collection, Context, Image, Object, Property, PropertyGroup
 
 from ...parameters import FACTOR, LENGTH, within
 from ...planting.rules import Companion, Rules
@@ -45,12 +45,12 @@ listeners = Listeners()
 _kept_items: dict[int, list] = {}  # Blender keeps no copy of the strings of dynamic items
 
 
-def _on_distance(settings: bpy.types.PropertyGroup, _context: bpy.types.Context) -> None:
+def _on_distance(settings: PropertyGroup, _context: Context) -> None:
     settings.distance_from = 'OWN'
     listeners.notify()
 
 
-def _choose_distance(settings: bpy.types.PropertyGroup, by_species: bool) -> None:
+def _choose_distance(settings: PropertyGroup, by_species: bool) -> None:
     choose(settings, by_species)
     listeners.notify()
 
@@ -80,7 +80,7 @@ _AGE = "Age of the plants in years, half of them younger and half older; 0 is fu
 _SOURCE = partial(choice, "Distance From", "", SOURCES, default='SPECIES', **HIDDEN)
 
 
-def _companion_items(entry: "TetFloraMixEntry", _context: bpy.types.Context | None) -> list:
+def _companion_items(entry: "TetFloraMixEntry", _context: Context | None) -> list:
     items = items_for(entry.companion)
     return _kept_items.setdefault(id(items), [NOBODY, *items])
 
@@ -90,7 +90,7 @@ def _choose_companion(entry: "TetFloraMixEntry", number: int) -> None:
     entry.companion = found[0] if found and number else ""
 
 
-class TetFloraMixEntry(bpy.types.PropertyGroup, SpeciesChoice):
+class TetFloraMixEntry(PropertyGroup, SpeciesChoice):
     """One species of a mixture to populate with, and its companion."""
 
     weight: real("Weight", "Relative frequency of this species among the plants", 1.0, **within(0.0, 10.0), **LIVE)
@@ -108,11 +108,11 @@ class TetFloraMixEntry(bpy.types.PropertyGroup, SpeciesChoice):
     shed_by: string("Shed By", "Species that sheds what lies there; any if empty", **{**LIVE, **HIDDEN})
 
 
-class TetFloraGround(bpy.types.PropertyGroup):
+class TetFloraGround(PropertyGroup):
     """One mesh that a population grows on."""
 
     object: pointer_to(
-        bpy.types.Object,
+        Object,
         "Ground",
         "Mesh that the plants grow on, including its modifiers",
         poll=lambda _group, candidate: candidate.type == 'MESH' and not candidate.tetflora.is_field,
@@ -135,7 +135,7 @@ LIMITS = {
 _OPEN = {"slope_max": pi / 2}  # values that leave everything open, where defaults do not
 
 
-def _limit_items(owner: bpy.types.PropertyGroup, _context: bpy.types.Context | None) -> list:
+def _limit_items(owner: PropertyGroup, _context: Context | None) -> list:
     known = owner.bl_rna.properties
     others = ('FACING', 'EDGE', 'AREAS') if getattr(owner, "kind", "") == 'BIOME' else ()
     found = [
@@ -146,7 +146,7 @@ def _limit_items(owner: bpy.types.PropertyGroup, _context: bpy.types.Context | N
     return _kept_items.setdefault(len(found), found)
 
 
-def limits_in_use(owner: bpy.types.PropertyGroup) -> int:
+def limits_in_use(owner: PropertyGroup) -> int:
     """Bits of `LIMITS` that are switched on, or of which something is set."""
     known, found = owner.bl_rna.properties, owner.limits_shown
     for number, (_, _, names) in enumerate(LIMITS.values()):
@@ -155,7 +155,7 @@ def limits_in_use(owner: bpy.types.PropertyGroup) -> int:
     return found
 
 
-def _open_value(prop: bpy.types.Property) -> object:
+def _open_value(prop: Property) -> object:
     """Value of a setting that limits nothing."""
     return _OPEN.get(prop.identifier, getattr(prop, "default", None))
 
@@ -164,7 +164,7 @@ def _differs(value: object, other: object) -> bool:
     return abs(value - other) > 1e-6 if isinstance(other, float) else value != other
 
 
-def _set_limits(owner: bpy.types.PropertyGroup, bits: int) -> None:
+def _set_limits(owner: PropertyGroup, bits: int) -> None:
     known, before = owner.bl_rna.properties, limits_in_use(owner)
     owner.limits_shown = bits
     for number, (_, _, names) in enumerate(LIMITS.values()):
@@ -185,7 +185,7 @@ class GroundMask:
     vertex_group: string("Vertex Group", "Weights that say where plants grow: 0 is bare, 1 is full", **LIVE)
     invert_group: boolean("Invert Vertex Group", "Weight 1 is bare, 0 is full", **LIVE)
     image: pointer_to(
-        bpy.types.Image, "Image", "Image whose brightness says where plants grow: black is bare, white is full", **LIVE
+        Image, "Image", "Image whose brightness says where plants grow: black is bare, white is full", **LIVE
     )
     invert_image: boolean("Invert Image", "White is bare, black is full", **LIVE)
     uv_layer: string("UV Map", "UV map of the ground for the image; the active one if empty", **LIVE)
@@ -204,16 +204,10 @@ class AroundPaths:
     )
     limits_shown: integer("Limits That Are Shown", **HIDDEN)
     areas: pointer_to(
-        bpy.types.Collection,
-        "Areas",
-        "Collection of closed curves; plants grow only inside them, as seen from above",
-        **LIVE,
+        Collection, "Areas", "Collection of closed curves; plants grow only inside them, as seen from above", **LIVE
     )
     paths: pointer_to(
-        bpy.types.Collection,
-        "Paths",
-        "Collection of curves along which the ground stays bare, as seen from above",
-        **LIVE,
+        Collection, "Paths", "Collection of curves along which the ground stays bare, as seen from above", **LIVE
     )
     path_distance: real(
         "Path Distance",
@@ -225,7 +219,7 @@ class AroundPaths:
     )
 
 
-def _holders(layer: "TetFloraLayer") -> list[bpy.types.Collection | bpy.types.Object]:
+def _holders(layer: "TetFloraLayer") -> list[Collection | Object]:
     """What the plants of a layer are in: its collection or object, or those of the layers of a biome."""
     own = [one for one in (layer.collection, layer.field) if one is not None]
     if layer.kind == BIOME:
@@ -244,7 +238,7 @@ def _show(layer: "TetFloraLayer", on: bool) -> None:
         one.hide_render = one.hide_viewport = not on
 
 
-class TetFloraLayer(bpy.types.PropertyGroup, settings_in(Limits, Rules, **LIVE), GroundMask, AroundPaths):
+class TetFloraLayer(PropertyGroup, settings_in(Limits, Rules, **LIVE), GroundMask, AroundPaths):
     """Something that grows on a ground, and how it is placed there."""
 
     # Identity and state. Plants refer to ``uid``, never to the name or the place in the list.
@@ -253,10 +247,10 @@ class TetFloraLayer(bpy.types.PropertyGroup, settings_in(Limits, Rules, **LIVE),
     kind: choice("Kind", "", [(k, k.title(), "") for k in (SCATTER, BIOME, FIELD)], **HIDDEN)
     frozen: boolean("Freeze", "Keep the plants of this layer: updates and removal leave them alone", **FIXED)
     shown: once.boolean("Show", "Show the layer in viewports, results and renders", get=_is_shown, set=_show)
-    field: pointer_to(bpy.types.Object, "Field", **HIDDEN)
+    field: pointer_to(Object, "Field", **HIDDEN)
     source: string("Source", **HIDDEN)  # identifier of the file that a biome was made from
     data: string("Data", **HIDDEN)  # of that file: what is not in layers, as JSON
-    collection: pointer_to(bpy.types.Collection, "Collection", **HIDDEN)
+    collection: pointer_to(Collection, "Collection", **HIDDEN)
     made: integer("Plants Made", **HIDDEN)
     message: string("Message", **HIDDEN)
     placed_by: string("Placed By", **HIDDEN)  # `rules.fingerprint` of when it was placed
@@ -266,10 +260,7 @@ class TetFloraLayer(bpy.types.PropertyGroup, settings_in(Limits, Rules, **LIVE),
 
     grounds: list_of(TetFloraGround, "Grounds", "Meshes that the plants grow on")
     ground_collection: pointer_to(
-        bpy.types.Collection,
-        "Ground Collection",
-        "All meshes in this collection are ground too, including those added later",
-        **LIVE,
+        Collection, "Ground Collection", "All meshes in this collection are ground too, also those added later", **LIVE
     )
     density: real(
         "Plants per Hectare",
@@ -319,9 +310,7 @@ MODES = (
 _BRUSH = properties_of(Brush, **FIXED)
 
 
-class TetFloraBrush(
-    bpy.types.PropertyGroup, settings_in(Rules, only=("scale_min", "scale_max"), **FIXED), SpeciesChoice
-):
+class TetFloraBrush(PropertyGroup, settings_in(Rules, only=("scale_min", "scale_max"), **FIXED), SpeciesChoice):
     """How the brush paints."""
 
     mode: choice("Mode", "What dragging does; hold Shift to erase", MODES, **FIXED)
@@ -351,12 +340,7 @@ class TetFloraBrush(
         "Create As",
         "What painted plants are created as. Erase and Thin affect both kinds",
         (
-            (
-                'AUTOMATIC',
-                "Automatic",
-                f"Empties until the scene has {MOST_PAINTED_EMPTIES:,}, then the field of painted plants",
-                0,
-            ),
+            ('AUTOMATIC', "Automatic", f"Empties up to {MOST_PAINTED_EMPTIES:,}, then a field of painted plants", 0),
             STORAGE_ITEMS[1],
             ('FIELD', "Field", 'One object, "Painted plants", whose vertices are the plants. Room for millions', 2),
         ),

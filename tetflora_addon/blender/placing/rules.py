@@ -19,6 +19,7 @@ from typing import Any
 
 import bpy
 import numpy as np
+from bpy.types import ID, Depsgraph, Object, Property, PropertyGroup, Scene, ViewLayer
 
 from ...arrays import Floats, Integers32
 from ...errors import SceneError
@@ -46,17 +47,17 @@ from .terrain import MASKS, ground_form, lies_elsewhere, lines_within, read_grou
 MASK = ("vertex_group", "invert_group", "image", "invert_image", "uv_layer")
 
 
-def biomes_in(scene: bpy.types.Scene) -> list[bpy.types.PropertyGroup]:
+def biomes_in(scene: Scene) -> list[PropertyGroup]:
     """Biomes of a scene, those above first."""
     return [layer for layer in scene.tetflora.layers if layer.kind == BIOME]
 
 
-def biome_of(scene: bpy.types.Scene, population: bpy.types.PropertyGroup) -> bpy.types.PropertyGroup | None:
+def biome_of(scene: Scene, population: PropertyGroup) -> PropertyGroup | None:
     """The biome of which a population is a layer; None of others."""
     return with_identity(scene.tetflora.layers, population.biome) if population.biome else None
 
 
-def limits_of_zone(biome: bpy.types.PropertyGroup) -> Limits:
+def limits_of_zone(biome: PropertyGroup) -> Limits:
     """The limits of a biome; those that are switched off are open."""
     given = {field.name: getattr(biome, field.name) for field in fields(Limits)}
     if not biome.use_altitude:
@@ -66,12 +67,12 @@ def limits_of_zone(biome: bpy.types.PropertyGroup) -> Limits:
     return Limits(**given)
 
 
-def is_limited(biome: bpy.types.PropertyGroup) -> bool:
+def is_limited(biome: PropertyGroup) -> bool:
     """Whether a biome takes only a part of its ground."""
     return bool(biome.vertex_group or biome.image or not limits_of_zone(biome).open)
 
 
-def come_before(scene: bpy.types.Scene, biome: bpy.types.PropertyGroup) -> list[bpy.types.PropertyGroup]:
+def come_before(scene: Scene, biome: PropertyGroup) -> list[PropertyGroup]:
     """Biomes with limits on a shared ground to which one gives way: those above it or, if it has none itself, all."""
     if not biome.gives_way:
         return []
@@ -82,7 +83,7 @@ def come_before(scene: bpy.types.Scene, biome: bpy.types.PropertyGroup) -> list[
     return [other for other in limited if own & {entry.object for entry in other.grounds}]
 
 
-def zone_values(scene: bpy.types.Scene, population: bpy.types.PropertyGroup) -> list[Any]:
+def zone_values(scene: Scene, population: PropertyGroup) -> list[Any]:
     """All that decides the zone of a population or stand, for its fingerprint; empty without a biome."""
     biome = biome_of(scene, population)
     if biome is None:
@@ -95,9 +96,7 @@ def zone_values(scene: bpy.types.Scene, population: bpy.types.PropertyGroup) -> 
     return values if len(values) > 1 or is_limited(biome) else []
 
 
-def read_zones(
-    depsgraph: bpy.types.Depsgraph, population: bpy.types.PropertyGroup, grounds: Sequence[bpy.types.Object]
-) -> tuple[Zone, ...]:
+def read_zones(depsgraph: Depsgraph, population: PropertyGroup, grounds: Sequence[Object]) -> tuple[Zone, ...]:
     """Zones that limit a population on its grounds: its biome's, and the inverse of those to which that gives way.
 
     Raises
@@ -113,9 +112,7 @@ def read_zones(
     return (*own, *others)
 
 
-def zoned(
-    depsgraph: bpy.types.Depsgraph, owner: bpy.types.PropertyGroup, grounds: Sequence[bpy.types.Object], ground: Terrain
-) -> Terrain:
+def zoned(depsgraph: Depsgraph, owner: PropertyGroup, grounds: Sequence[Object], ground: Terrain) -> Terrain:
     """A ground with the zones of a layer, a population or a stand, in its weights: as they are at the corners.
 
     Errors are those of `read_zones`.
@@ -133,7 +130,7 @@ def zoned(
     return replace(ground, weight=share if ground.weight is None else share * ground.weight)
 
 
-def _zone(biome: bpy.types.PropertyGroup, grounds: Sequence[bpy.types.Object], depsgraph: bpy.types.Depsgraph) -> Zone:
+def _zone(biome: PropertyGroup, grounds: Sequence[Object], depsgraph: Depsgraph) -> Zone:
     limits = limits_of_zone(biome)
     lines = () if biome.paths is None else lines_within(biome.paths, depsgraph)
     mask = {name: getattr(biome, name) for name in MASK}
@@ -158,12 +155,12 @@ _DIGITS = 4  # of erased places: tenths of a millimeter
 ENTRY = ("species", "weight", "companion", "companion_strength", "companion_distance", "habitat", "shed_by")
 
 
-def settings_of(group: type[bpy.types.PropertyGroup] | bpy.types.PropertyGroup) -> list[bpy.types.Property]:
+def settings_of(group: type[PropertyGroup] | PropertyGroup) -> list[Property]:
     """Properties of a population that define how plants are placed; a range is those of its numbers."""
     return [p for p in group.bl_rna.properties if p.identifier not in IDENTITY and not p.identifier.endswith("_range")]
 
 
-def fingerprint(population: bpy.types.PropertyGroup) -> str:
+def fingerprint(population: PropertyGroup) -> str:
     """A short text that changes with the settings; those left at their default do not count.
 
     A setting that a later version adds changes nothing for populations that do not use it.
@@ -173,7 +170,7 @@ def fingerprint(population: bpy.types.PropertyGroup) -> str:
         values.append([getattr(entry, name) for name in ENTRY])
     for name, default in _defaults(type(population)):
         value = distance_of(population) if name == "min_distance" else getattr(population, name)
-        if isinstance(value, bpy.types.ID):
+        if isinstance(value, ID):
             value = value.name_full
         if value != default:
             values.append([name, value])
@@ -187,7 +184,7 @@ def digest(values: list[Any]) -> str:
 
 
 @lru_cache(maxsize=1)
-def _defaults(kind: type[bpy.types.PropertyGroup]) -> tuple[tuple[str, Any], ...]:
+def _defaults(kind: type[PropertyGroup]) -> tuple[tuple[str, Any], ...]:
     """Names and defaults of settings that are single values; kept, because panels ask at every redraw.
 
     Of the distance counts what it is, and not where it comes from.
@@ -196,7 +193,7 @@ def _defaults(kind: type[bpy.types.PropertyGroup]) -> tuple[tuple[str, Any], ...
     return tuple((p.identifier, None if p.type == 'POINTER' else p.default) for p in simple)
 
 
-def awaits_update(population: bpy.types.PropertyGroup) -> bool:
+def awaits_update(population: PropertyGroup) -> bool:
     """Whether a population has no plants yet, or others than an update would give it; grounds are not read."""
     if not population.uid or population.frozen:
         return False
@@ -206,13 +203,13 @@ def awaits_update(population: bpy.types.PropertyGroup) -> bool:
     return outdated or (gone and all(o.tetflora.population != uid for o in every))
 
 
-def forms_of(grounds: Iterable[bpy.types.Object], form: Callable[[bpy.types.Object], str]) -> str:
+def forms_of(grounds: Iterable[Object], form: Callable[[Object], str]) -> str:
     """The forms of all grounds of a layer, as `ground_form` gives that of each; empty where one has none."""
     forms = list(map(form, grounds))
     return " ".join(forms) if all(forms) else ""
 
 
-def ground_steps(scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer) -> Generator[None, None, dict[str, tuple]]:
+def ground_steps(scene: Scene, view_layer: ViewLayer) -> Generator[None, None, dict[str, tuple]]:
     """Of each layer names of its grounds, those not in the scene, and where plants stood if one was changed since."""
     seen, form = {}, cache(lambda obj: ground_form(obj, view_layer.depsgraph))
     kept = [(one.uid, rules_of(one)) for one in scene.tetflora.layers]
@@ -230,24 +227,24 @@ seen_grounds = Outlook(ground_steps)
 register, unregister = seen_grounds.register, seen_grounds.unregister
 
 
-def grounds_seen(layer: bpy.types.PropertyGroup) -> tuple[str, list[str], str]:
+def grounds_seen(layer: PropertyGroup) -> tuple[str, list[str], str]:
     """What was found last of the grounds of a layer; cheap."""
     seen = seen_grounds.of(layer.id_data, bpy.context.view_layer) or {}
     return seen.get(layer.uid, ("…", [], ""))
 
 
-def on_changed_ground(layer: bpy.types.PropertyGroup) -> bool:
+def on_changed_ground(layer: PropertyGroup) -> bool:
     """Whether a ground was changed, as it was found last, and the layer was not grown again since; cheap."""
     return grounds_seen(layer)[-1] == rules_of(layer).stood_on != ""
 
 
-def free_seed(scene: bpy.types.Scene, seed: int) -> int:
+def free_seed(scene: Scene, seed: int) -> int:
     """A seed, or another if a population has it: where that one's plants stand there is no room."""
     taken = {layer.seed for layer in scene.tetflora.layers if layer.kind == SCATTER}
     return max(taken) % (2**31 - 1) + 1 if seed in taken else seed
 
 
-def copy_settings(source: bpy.types.PropertyGroup, target: bpy.types.PropertyGroup) -> None:
+def copy_settings(source: PropertyGroup, target: PropertyGroup) -> None:
     """Give a population the settings of another; identity, grounds and plants stay its own."""
     for prop in settings_of(source):
         if prop.type != 'COLLECTION':
@@ -257,24 +254,24 @@ def copy_settings(source: bpy.types.PropertyGroup, target: bpy.types.PropertyGro
         copy_entry(entry, target.mix.add())
 
 
-def copy_entry(source: bpy.types.PropertyGroup, target: bpy.types.PropertyGroup) -> None:
+def copy_entry(source: PropertyGroup, target: PropertyGroup) -> None:
     """Let an entry of a mixture be as another."""
     for name in ENTRY:
         setattr(target, name, getattr(source, name))
 
 
-def active_population(scene: bpy.types.Scene) -> bpy.types.PropertyGroup | None:
+def active_population(scene: Scene) -> PropertyGroup | None:
     """The population that buttons act on; None where the active layer is none."""
     active = active_in(scene.tetflora, "layers")
     return active if active is not None and active.kind == SCATTER else None
 
 
-def shown_population(scene: bpy.types.Scene) -> bpy.types.PropertyGroup:
+def shown_population(scene: Scene) -> PropertyGroup:
     """What the panel shows: the active population, or the settings for new ones where there is none."""
     return active_population(scene) or scene.tetflora.populate
 
 
-def rules_from(population: bpy.types.PropertyGroup) -> tuple[Rules, tuple[str, ...]]:
+def rules_from(population: PropertyGroup) -> tuple[Rules, tuple[str, ...]]:
     """A population's settings as the engine takes them, and the species that its weights refer to.
 
     Companions that are not in the mixture follow it with a weight of 0.
@@ -298,19 +295,19 @@ def rules_from(population: bpy.types.PropertyGroup) -> tuple[Rules, tuple[str, .
     return Rules(**given, density=density, weights=every, companions=companions), species
 
 
-def makes_field(population: bpy.types.PropertyGroup, number: int) -> bool:
+def makes_field(population: PropertyGroup, number: int) -> bool:
     """Whether so many plants of a population are made as one field."""
     return population.as_field == 'FIELD' or (population.as_field == 'AUTOMATIC' and number > EMPTIES_UNASKED)
 
 
-def note_erased(population: bpy.types.PropertyGroup, centers: Floats | Sequence, radius: float) -> None:
+def note_erased(population: PropertyGroup, centers: Floats | Sequence, radius: float) -> None:
     """Keep circles on the map bare, with centers (n, 2) or more columns; meters."""
     flat = np.round(np.asarray(centers, dtype=np.float64)[:, :2], _DIGITS).ravel().tolist()
     strokes = [*_strokes(population), [round(radius, _DIGITS), *flat]]
     population.erased = json.dumps(strokes, separators=(",", ":"))
 
 
-def _strokes(population: bpy.types.PropertyGroup) -> list[list[float]]:
+def _strokes(population: PropertyGroup) -> list[list[float]]:
     try:
         strokes = parse_json(population.erased) if population.erased else []
         if all(len(stroke) % 2 and np.isfinite(np.array(stroke, np.float64)).all() for stroke in strokes):
@@ -320,7 +317,7 @@ def _strokes(population: bpy.types.PropertyGroup) -> list[list[float]]:
     raise SceneError(f'"{population.name}": its erased places cannot be read; click Clear Erased Places')
 
 
-def grounds_of(scene: bpy.types.Scene, population: bpy.types.PropertyGroup) -> list[bpy.types.Object]:
+def grounds_of(scene: Scene, population: PropertyGroup) -> list[Object]:
     """Meshes of the scene that a population grows on.
 
     What was deleted from the scene does not count, although the population's pointer keeps it in the file.
@@ -335,7 +332,7 @@ def grounds_of(scene: bpy.types.Scene, population: bpy.types.PropertyGroup) -> l
     return [o for o in meshes if o in there]
 
 
-def checked_grounds(scene: bpy.types.Scene, population: bpy.types.PropertyGroup) -> list[bpy.types.Object]:
+def checked_grounds(scene: Scene, population: PropertyGroup) -> list[Object]:
     """The same; a `SceneError` where there are none."""
     if not (grounds := grounds_of(scene, population)):
         raise SceneError(
@@ -346,7 +343,7 @@ def checked_grounds(scene: bpy.types.Scene, population: bpy.types.PropertyGroup)
     return grounds
 
 
-def set_grounds(population: bpy.types.PropertyGroup, grounds: Iterable[bpy.types.Object]) -> None:
+def set_grounds(population: PropertyGroup, grounds: Iterable[Object]) -> None:
     """Let a population grow on these meshes instead."""
     population.grounds.clear()
     for obj in grounds:
@@ -378,11 +375,11 @@ class Search:
 
 
 def read_search(
-    scene: bpy.types.Scene,
-    depsgraph: bpy.types.Depsgraph,
-    population: bpy.types.PropertyGroup,
-    own: Collection[bpy.types.Object],
-    grounds: Sequence[bpy.types.Object] | None = None,
+    scene: Scene,
+    depsgraph: Depsgraph,
+    population: PropertyGroup,
+    own: Collection[Object],
+    grounds: Sequence[Object] | None = None,
     most: int | None = None,
     above: Above | None = None,
 ) -> Search:
@@ -428,9 +425,7 @@ def read_search(
     return Search(ground, rules, present, suits, tuple(erased), species, zones)
 
 
-def standing(
-    depsgraph: bpy.types.Depsgraph, without: Collection[bpy.types.Object], species: Sequence[str]
-) -> tuple[Floats, Integers32]:
+def standing(depsgraph: Depsgraph, without: Collection[Object], species: Sequence[str]) -> tuple[Floats, Integers32]:
     """Places (m, 3) and species (m,) of the plants of the scene, those that are objects and those of fields.
 
     Parameters

@@ -283,11 +283,7 @@ class TetFloraSpeciesOutput(bpy.types.PropertyGroup, SpeciesChoice):
     """Output settings of one species."""
 
     pass_index: integer(
-        "Pass Index",
-        "Object index of this species' meshes and proxies, for compositing masks",
-        1,
-        **within(0, high=32767),
-        **_COMMON,
+        "Pass Index", "Index of this species' results, for compositing masks", 1, **within(0, high=32767), **_COMMON
     )
     light_group: string(
         "Light Group", "Light group of this species' meshes and proxies; if empty, that of all results", **_COMMON
@@ -299,10 +295,7 @@ class TetFloraSpeciesOutput(bpy.types.PropertyGroup, SpeciesChoice):
 
 _PLACES = {
     "show_viewport": boolean(
-        "Viewports",
-        "Show meshes and proxies in 3D viewports. Hide them to work with the plants alone at full speed",
-        True,
-        **_COMMON,
+        "Viewports", "Show results in viewports. Hide them to work with plants alone at full speed", True, **_COMMON
     ),
     "show_render": boolean("Renders", "Show meshes and proxies in renders", True, **_COMMON),
     "save_results": boolean(
@@ -323,15 +316,10 @@ class TetFloraOutput(
     """Output settings of all results."""
 
     pass_index: integer(
-        "Pass Index",
-        "Object index of all meshes and proxies, except for species with their own",
-        **within(0, high=32767),
-        **_COMMON,
+        "Pass Index", "Object index of results, except for species with their own", **within(0, high=32767), **_COMMON
     )
     light_group: string(
-        "Light Group",
-        "Light group of all meshes and proxies; matters where they emit light, as with baked lighting",
-        **_COMMON,
+        "Light Group", "Light group of all results; matters where they emit light, as with baked lighting", **_COMMON
     )
     species: list_of(TetFloraSpeciesOutput, "Species", "Species with their own pass index, light group or materials")
     species_index: integer("Active Species", options={'HIDDEN', 'SKIP_SAVE'})

@@ -15,6 +15,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 
 import bpy
+from bpy.types import Collection, Depsgraph, LayerCollection, Object, Scene, ViewLayer
 
 from ...errors import SceneError
 from ..main_thread import in_main_thread, restore_in_main_thread
@@ -29,13 +30,13 @@ _FLAGS = ("hide_render", "hide_viewport", "hide_select")
 _LAYER_FLAGS = ("holdout", "indirect_only", "hide_viewport")
 
 
-def linked_hidden(scene: bpy.types.Scene, purpose: str) -> list[bpy.types.Object]:
+def linked_hidden(scene: Scene, purpose: str) -> list[Object]:
     """Linked objects that are hidden for a scene's results."""
     record = scene.get(HIDDEN_LINKED[purpose])
     return [] if record is None else [e["object"] for e in record["objects"] if e["object"] is not None]
 
 
-def is_switched(obj: bpy.types.Object) -> bool:
+def is_switched(obj: Object) -> bool:
     """Whether an animation sets the visibility of an object."""
     animation = obj.animation_data
     if animation is None:
@@ -46,7 +47,7 @@ def is_switched(obj: bpy.types.Object) -> bool:
     return any(curve.data_path in _FLAGS for curve in curves)
 
 
-def hide_linked(scene: bpy.types.Scene, purpose: str, originals: Sequence[bpy.types.Object]) -> None:
+def hide_linked(scene: Scene, purpose: str, originals: Sequence[Object]) -> None:
     """Hide linked objects too.
 
     Raises
@@ -94,7 +95,7 @@ def hide_linked(scene: bpy.types.Scene, purpose: str, originals: Sequence[bpy.ty
     }
 
 
-def show_linked(scene: bpy.types.Scene, purpose: str) -> None:
+def show_linked(scene: Scene, purpose: str) -> None:
     """Show what `hide_linked` hid, as it was."""
     record = scene.get(HIDDEN_LINKED[purpose])
     if record is None:
@@ -113,7 +114,7 @@ def show_linked(scene: bpy.types.Scene, purpose: str) -> None:
     del scene[HIDDEN_LINKED[purpose]]
 
 
-def scenes_hiding() -> Iterator[tuple[bpy.types.Scene, str]]:
+def scenes_hiding() -> Iterator[tuple[Scene, str]]:
     """Scenes of this file for which linked objects are hidden, and for which results; those of renders first."""
     for purpose in ('RENDER', 'VIEW'):
         for scene in bpy.data.scenes:
@@ -121,11 +122,11 @@ def scenes_hiding() -> Iterator[tuple[bpy.types.Scene, str]]:
                 yield scene, purpose
 
 
-def _collections(scene: bpy.types.Scene) -> list[bpy.types.Collection]:
+def _collections(scene: Scene) -> list[Collection]:
     return [scene.collection, *scene.collection.children_recursive]
 
 
-def _layers(scene: bpy.types.Scene) -> Iterator[tuple[tuple[str, str], bpy.types.LayerCollection]]:
+def _layers(scene: Scene) -> Iterator[tuple[tuple[str, str], LayerCollection]]:
     """All layer collections but the first ones, parents first, by view layer and path."""
     for view_layer in scene.view_layers:
         waiting = [(child.collection.name_full, child) for child in view_layer.layer_collection.children]
@@ -135,16 +136,14 @@ def _layers(scene: bpy.types.Scene) -> Iterator[tuple[tuple[str, str], bpy.types
             waiting += [(f"{path}\n{child.collection.name_full}", child) for child in layer.children]
 
 
-def _exclude(scene: bpy.types.Scene, wanted: dict[tuple[str, str], bool]) -> None:
+def _exclude(scene: Scene, wanted: dict[tuple[str, str], bool]) -> None:
     """Exclude collections from view layers; what is set for one also sets those within it, which come later here."""
     for key, layer in _layers(scene):
         if layer.exclude != wanted.get(key, layer.exclude):
             layer.exclude = wanted[key]
 
 
-def _beside(
-    scene: bpy.types.Scene, home: bpy.types.Collection, hidden: Sequence[bpy.types.Object]
-) -> bpy.types.Collection | None:
+def _beside(scene: Scene, home: Collection, hidden: Sequence[Object]) -> Collection | None:
     """A collection with all of another but what is hidden, as visible; None where nothing else is in it."""
     others = [obj for obj in home.objects if obj not in hidden]
     if not others:
@@ -173,7 +172,7 @@ HIDDEN = {'VIEW': "tetflora_hidden", 'RENDER': "tetflora_hidden_for_render"}
 OVERRIDES = "tetflora_hidden_overrides"
 
 
-def hide_originals(scene: bpy.types.Scene, purpose: str, originals: Sequence[bpy.types.Object]) -> None:
+def hide_originals(scene: Scene, purpose: str, originals: Sequence[Object]) -> None:
     """Hide objects that results replace, in viewports too unless the results are only for a render.
 
     Raises
@@ -195,9 +194,7 @@ def hide_originals(scene: bpy.types.Scene, purpose: str, originals: Sequence[bpy
         original.hide_viewport = original.hide_viewport or purpose == 'VIEW'
 
 
-def remove_results(
-    scene: bpy.types.Scene, purpose: str | None = None, keep: Sequence[bpy.types.Collection] = ()
-) -> int:
+def remove_results(scene: Scene, purpose: str | None = None, keep: Sequence[Collection] = ()) -> int:
     """Remove result collections and show what they replace; returns the number of datablocks removed."""
     adopt_copies()
     for which in ('RENDER', 'VIEW'):
@@ -226,7 +223,7 @@ def adopt_copies() -> None:
                     _mark(original, purpose, marker[0], [scene.name])
 
 
-def hidden_originals(scene: bpy.types.Scene, purpose: str | None = None) -> list[bpy.types.Object]:
+def hidden_originals(scene: Scene, purpose: str | None = None) -> list[Object]:
     """Objects that are hidden for a scene's results, or for results that no longer exist.
 
     They may not be in the scene any more.
@@ -236,7 +233,7 @@ def hidden_originals(scene: bpy.types.Scene, purpose: str | None = None) -> list
     return own + [o for which in purposes for o in linked_hidden(scene, which)]
 
 
-def show_originals(scene: bpy.types.Scene, purpose: str) -> None:
+def show_originals(scene: Scene, purpose: str) -> None:
     """Show what is hidden for a scene's results of one purpose."""
     show_linked(scene, purpose)
     for original in hidden_originals(scene, purpose):
@@ -248,23 +245,23 @@ def show_originals(scene: bpy.types.Scene, purpose: str) -> None:
             _show(original, purpose)
 
 
-def artists_flags(original: bpy.types.Object) -> list[bool]:
+def artists_flags(original: Object) -> list[bool]:
     """Whether an object is hidden in renders and in viewports, as the artist left it."""
     marks = [marker for purpose in HIDDEN if (marker := _marker(original, purpose)) is not None]
     return marks[0][0] if marks else [original.hide_render, original.hide_viewport]
 
 
-def _show(original: bpy.types.Object, purpose: str) -> None:
+def _show(original: Object, purpose: str) -> None:
     original.hide_render, original.hide_viewport = _marker(original, purpose)[0]
     del original[HIDDEN[purpose]]
 
 
-def _marked(purpose: str) -> list[bpy.types.Object]:
+def _marked(purpose: str) -> list[Object]:
     """Objects of this file, not of its libraries, that are hidden."""
     return [o for o in bpy.data.objects if HIDDEN[purpose] in o and o.library is None]
 
 
-def _marker(original: bpy.types.Object, purpose: str) -> tuple[list[bool], list[str]] | None:
+def _marker(original: Object, purpose: str) -> tuple[list[bool], list[str]] | None:
     """Flags before it was hidden, and names of scenes; None for an object that is not hidden."""
     stored = original.get(HIDDEN[purpose])
     if stored is None:
@@ -273,20 +270,20 @@ def _marker(original: bpy.types.Object, purpose: str) -> tuple[list[bool], list[
     return marker["flags"], marker["scenes"]
 
 
-def _mark(original: bpy.types.Object, purpose: str, flags: list[bool], scenes: list[str]) -> None:
+def _mark(original: Object, purpose: str, flags: list[bool], scenes: list[str]) -> None:
     original[HIDDEN[purpose]] = json.dumps({"flags": flags, "scenes": scenes})
 
 
-def _concerns(scene: bpy.types.Scene, original: bpy.types.Object, purpose: str) -> bool:
+def _concerns(scene: Scene, original: Object, purpose: str) -> bool:
     return scene.name in _marker(original, purpose)[1] or not _others(scene, original, purpose)
 
 
-def _others(scene: bpy.types.Scene, original: bpy.types.Object, purpose: str) -> list[str]:
+def _others(scene: Scene, original: Object, purpose: str) -> list[str]:
     """Names of other scenes whose results replace an object."""
     return [other.name for other in _replacing(original, purpose) if other != scene]
 
 
-def _replacing(original: bpy.types.Object, purpose: str) -> list[bpy.types.Scene]:
+def _replacing(original: Object, purpose: str) -> list[Scene]:
     """Scenes whose results replace an object; where one was renamed, those that the object is in."""
     names = _marker(original, purpose)[1]
     renamed = any(name not in bpy.data.scenes for name in names)
@@ -298,7 +295,7 @@ def _replacing(original: bpy.types.Object, purpose: str) -> list[bpy.types.Scene
     ]
 
 
-def keep_results(scene: bpy.types.Scene) -> int:
+def keep_results(scene: Scene) -> int:
     """Turn a scene's results into ordinary meshes; returns their number. Objects that they replace stay hidden."""
     adopt_copies()
     for original in _marked('VIEW'):
@@ -350,12 +347,12 @@ def lift_marks() -> dict[tuple, str | list]:
     return lifted
 
 
-def name_of(obj: bpy.types.Object) -> tuple[str, str]:
+def name_of(obj: Object) -> tuple[str, str]:
     """Names of an object and of its library, empty for this file. Saving a file may change the paths of libraries."""
     return obj.name, "" if obj.library is None else obj.library.name
 
 
-def object_named(key: tuple[str, str]) -> bpy.types.Object | None:
+def object_named(key: tuple[str, str]) -> Object | None:
     """The object that `name_of` names; None where it is gone."""
     name, home = key
     library = bpy.data.libraries.get(home) if home else None
@@ -416,7 +413,7 @@ def unpack_override_marks() -> None:
         del scene[OVERRIDES]
 
 
-def _not_evaluated(scene: bpy.types.Scene, layer: bpy.types.ViewLayer) -> dict[bpy.types.Object, tuple[bool, bool]]:
+def _not_evaluated(scene: Scene, layer: ViewLayer) -> dict[Object, tuple[bool, bool]]:
     """What renders but is disabled in viewports, or its collections are: whether it is itself, and its eye closed."""
     disabled = [c for c in scene.collection.children_recursive if c.hide_viewport and not c.hide_render]
     within = {o for c in disabled for o in c.all_objects}
@@ -426,7 +423,7 @@ def _not_evaluated(scene: bpy.types.Scene, layer: bpy.types.ViewLayer) -> dict[b
 
 
 @contextmanager
-def originals_shown(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph | None = None) -> Iterator[None]:
+def originals_shown(scene: Scene, depsgraph: Depsgraph | None = None) -> Iterator[None]:
     """Show objects that results of any scene hide as the artist left them, while the context lasts.
 
     The dependency graph is updated if it is given, which only evaluated data requires. What renders but is disabled in

@@ -17,6 +17,7 @@ from typing import Any
 
 import bpy
 import numpy as np
+from bpy.types import ID, Collection, Depsgraph, GeometrySet, Mesh, NodeTree, Object
 from numpy.typing import NDArray
 
 from ...arrays import Floats, Integers, Integers32
@@ -43,12 +44,12 @@ _NAMES = {
 _SOURCE = "Source"
 _COMPONENTS = ("mesh", "curves", "pointcloud", "volume")
 
-Source = bpy.types.Object | bpy.types.Collection
+Source = Object | Collection
 
 
 def add_instances(
-    results: Results, name: str, source: Source, matrices: Floats, ids: Integers32, like: bpy.types.Object | None = None
-) -> bpy.types.Object:
+    results: Results, name: str, source: Source, matrices: Floats, ids: Integers32, like: Object | None = None
+) -> Object:
     """Add one object that shows many instances of an object or a collection.
 
     Parameters
@@ -78,12 +79,12 @@ def add_instances(
 def add_cluster_instances(
     results: Results,
     name: str,
-    objects: Sequence[bpy.types.Object],
+    objects: Sequence[Object],
     pick: Integers32,
     matrices: Floats,
     ids: Integers32,
-    like: bpy.types.Object | None = None,
-) -> bpy.types.Object:
+    like: Object | None = None,
+) -> Object:
     """Add one object that shows instances of many objects, such as those of `add_cluster`.
 
     Parameters
@@ -109,9 +110,7 @@ def add_cluster_instances(
     return results.add_object(name, made, KIND_CLUSTERS, collection)
 
 
-def add_cluster(
-    results: Results, stem: str, number: int, mesh: bpy.types.Mesh, like: bpy.types.Object | None = None
-) -> bpy.types.Object:
+def add_cluster(results: Results, stem: str, number: int, mesh: Mesh, like: Object | None = None) -> Object:
     """Make an object of a mesh of a cluster, in no collection, for `add_cluster_instances`.
 
     Parameters
@@ -141,20 +140,20 @@ def carrier_of(results: Results, target: Any) -> Source:
     return results.shared(("carrier", target), lambda: make(results, target.name, target.geometry or target.family))
 
 
-def _family(results: Results, name: str, family: Sequence[tuple[bpy.types.Object, Any]]) -> bpy.types.Collection:
+def _family(results: Results, name: str, family: Sequence[tuple[Object, Any]]) -> Collection:
     made = [_held(results, f"{name} {n}", one, np.array([at]), np.array([n])) for n, (one, at) in enumerate(family)]
     return _collection(results, name, made)
 
 
-def _carrier(results: Results, name: str, geometry: bpy.types.GeometrySet) -> Source:
+def _carrier(results: Results, name: str, geometry: GeometrySet) -> Source:
     parts = [c for c in (getattr(geometry, kind, None) for kind in _COMPONENTS) if c is not None]
-    parts = [c for c in parts if not isinstance(c, bpy.types.Mesh) or len(c.vertices)]
+    parts = [c for c in parts if not isinstance(c, Mesh) or len(c.vertices)]
     objects = [_carried(results, name, part) for part in parts]
     nested = _nested(results, name, geometry)
     return objects[0] if len(objects) == 1 and not nested else _collection(results, name, objects + nested)
 
 
-def _carried(results: Results, name: str, part: bpy.types.ID) -> bpy.types.Object:
+def _carried(results: Results, name: str, part: ID) -> Object:
     data = part.copy()
     name = results.name_for(f"{name} 0")
     data.name = name
@@ -166,19 +165,17 @@ def _carried(results: Results, name: str, part: bpy.types.ID) -> bpy.types.Objec
     return made
 
 
-def _nested(results: Results, name: str, geometry: bpy.types.GeometrySet) -> list[bpy.types.Object]:
+def _nested(results: Results, name: str, geometry: GeometrySet) -> list[Object]:
     """Objects that show the instances within geometry."""
     made = []
     for inner, rows in references_of(geometry):
-        known = isinstance(inner, bpy.types.Object | bpy.types.Collection)
+        known = isinstance(inner, Object | Collection)
         source = inner.original if known else _carrier(results, name, inner)
         made.append(_held(results, f"{name} {len(made) + 1}", source, rows.columns.transpose(0, 2, 1), rows.number))
     return made
 
 
-def _held(
-    results: Results, name: str, source: Source, matrices: NDArray[np.floating], ids: Integers
-) -> bpy.types.Object:
+def _held(results: Results, name: str, source: Source, matrices: NDArray[np.floating], ids: Integers) -> Object:
     made = _instancer(own := results.name_for(name), source, matrices, ids)
     results.hold(made, own)
     return made
@@ -186,9 +183,9 @@ def _held(
 
 def _instancer(
     name: str, source: Source, matrices: NDArray[np.floating], ids: Integers, pick: Integers32 | None = None
-) -> bpy.types.Object:
+) -> Object:
     """An object in no collection whose nodes show instances of a source, or of objects picked from a collection."""
-    kind = 'COLLECTION' if isinstance(source, bpy.types.Collection) else 'OBJECT'
+    kind = 'COLLECTION' if isinstance(source, Collection) else 'OBJECT'
     kind = kind if pick is None else 'CHILDREN'
     mesh = bpy.data.meshes.new(name)
     mesh.vertices.add(len(matrices))
@@ -206,7 +203,7 @@ def _instancer(
     return made
 
 
-def _group(kind: str) -> bpy.types.NodeTree:
+def _group(kind: str) -> NodeTree:
     """Geometry nodes that turn points into instances of an object, of a collection, or of the objects of one."""
 
     def build(graph: Graph, given: dict[str, Term]) -> dict[str, Any]:
@@ -237,7 +234,7 @@ def _group(kind: str) -> bpy.types.NodeTree:
     return node_group(_NAMES[kind], _VERSION, inputs, (("Geometry", 'Geometry'),), build, 'Geometry')
 
 
-def _collection(results: Results, name: str, objects: Sequence[bpy.types.Object]) -> bpy.types.Collection:
+def _collection(results: Results, name: str, objects: Sequence[Object]) -> Collection:
     """A collection in no scene; the dot keeps it out of menus."""
     made = bpy.data.collections.new(f".TetFlora {name}")
     results.hold(made)
@@ -257,9 +254,7 @@ _INSTANCED = {'OBJECT', 'COLLECTION'}
 _TURNED_OFF = ("is_scatter", "is_explicit", "is_plant", "is_field", "is_occluder")
 
 
-def add_stand_in(
-    results: Results, name: str, original: bpy.types.Object, depsgraph: bpy.types.Depsgraph
-) -> bpy.types.Object | None:
+def add_stand_in(results: Results, name: str, original: Object, depsgraph: Depsgraph) -> Object | None:
     """Add what an object shows besides instances to the results; None if that is nothing.
 
     Parameters
@@ -308,7 +303,7 @@ def add_stand_in(
     return results.add_object(name, made, STAND_IN, None, placed=True)
 
 
-def shows_itself(original: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> bool:
+def shows_itself(original: Object, depsgraph: Depsgraph) -> bool:
     """Whether an object has geometry that renders besides its instances."""
     instances = original.instance_type in {'VERTS', 'FACES', 'COLLECTION'} or len(original.particle_systems)
     hair = any(system.settings.render_type == 'PATH' for system in original.particle_systems)
@@ -322,7 +317,7 @@ def shows_itself(original: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> 
     return shown or geometry.volume is not None or hair
 
 
-def _is_simulated(original: bpy.types.Object) -> bool:
+def _is_simulated(original: Object) -> bool:
     """Whether a copy would not be as the object is: its modifiers remember earlier frames."""
     groups = {m.node_group for m in original.modifiers if m.type == 'NODES' and m.node_group is not None}
     waiting = list(groups)
@@ -337,7 +332,7 @@ def _is_simulated(original: bpy.types.Object) -> bool:
     return any(modifier.type in _SIMULATED for modifier in original.modifiers)
 
 
-def _bare_group() -> bpy.types.NodeTree:
+def _bare_group() -> NodeTree:
     """Geometry nodes that pass on all but instances."""
 
     def build(graph: Graph, given: dict[str, Term]) -> dict[str, Any]:

@@ -48,7 +48,7 @@ def species_leaf_material(species: Species, kind: str) -> bpy.types.Material:
     kind : str
         One of `LEAF_KINDS`.
     """
-    forms = species.forms(LEAF_KINDS.index(kind))
+    forms = species.forms(kind)
     model = forms[0] if isinstance(forms[0], LeafModel) else None
     through = species.leaf_transmission if kind == "leaf" else species.blossom_transmission
     leaflet = model.shape.length if model is not None and isinstance(model.shape, Compound) else 1.0
@@ -225,7 +225,7 @@ def materials_of(scene: bpy.types.Scene, species: Species, kind: str, form: int)
 def brought_materials(scene: bpy.types.Scene, kind_of_plant: str) -> list[list[str]]:
     """Names of the materials of a species' leaf objects, form by form and slot by slot."""
     identifier = species_of(kind_of_plant)
-    forms = [(k, n) for k in LEAF_KINDS for n in range(len(species_for(scene, identifier).forms(LEAF_KINDS.index(k))))]
+    forms = [(k, n) for k in LEAF_KINDS for n in range(len(species_for(scene, identifier).forms(k)))]
     return [[getattr(m, "name_full", "") for m in _brought(scene, identifier, kind, form)] for kind, form in forms]
 
 
@@ -233,7 +233,7 @@ def _brought(scene: bpy.types.Scene, identifier: str, kind: str, form: int) -> l
     """Materials of the leaf object of a form, slot by slot; empty without one."""
     source = leaf_objects(scene).get(identifier) if kind == "leaf" else None
     if source is None:
-        named = species_for(scene, identifier).forms(LEAF_KINDS.index(kind))[form]
+        named = species_for(scene, identifier).forms(kind)[form]
         source = bpy.data.objects.get(named) if isinstance(named, str) else None
     return [slot.material for slot in source.material_slots] if source is not None else []
 

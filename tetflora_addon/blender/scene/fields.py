@@ -14,6 +14,7 @@ from dataclasses import dataclass, fields, replace
 
 import bpy
 import numpy as np
+from bpy.types import Attribute, Depsgraph, FCurve, GeometrySet, Mesh, Object, PointCloud, Scene
 from mathutils import Matrix
 from numpy.typing import NDArray
 
@@ -41,7 +42,7 @@ _SEEDS = {*_INTEGERS, 'INT32_2D'}
 _BLOCK = 4_096  # points whose rotations are found at a time, so that they stay in the cache
 #: Attributes of fields that TetFlora makes, with their types.
 FIELD_ATTRIBUTES = {"rotation": 'QUATERNION', "scale": 'FLOAT', "species": 'INT', "seed": 'INT'}
-Points = bpy.types.Mesh | bpy.types.PointCloud
+Points = Mesh | PointCloud
 #: Types of objects that can be marked as fields.
 FIELD_TYPES = {'MESH', 'POINTCLOUD'}
 HEIGHT = "tf_height"
@@ -59,7 +60,7 @@ _MOST_FIT, _MOST_OFFSET = 10.0, 10.0
 _STEADY = np.cos(np.radians(30.0))  # trunks that turn further from one record to the next have fallen
 
 
-def stored_ages(plants: Sequence[bpy.types.Object]) -> Floats | None:
+def stored_ages(plants: Sequence[Object]) -> Floats | None:
     """Ages (n,) of plants that are objects, or of fields without the attribute; None where all are full-grown.
 
     Raises
@@ -77,7 +78,7 @@ def stored_ages(plants: Sequence[bpy.types.Object]) -> Floats | None:
     return ages if ages.any() else None
 
 
-def has_ages(field: bpy.types.Object) -> bool:
+def has_ages(field: Object) -> bool:
     """Whether points of a field have ages of their own, as far as they are stored."""
     return any(name in field.data.attributes for name in (PREFIX + AGE, AGE))
 
@@ -109,9 +110,7 @@ class FieldPoints:
         return child_key(key_of_seed(self.seed), keys[:, None]).view(np.int64).reshape(-1)
 
 
-def parts_of(
-    obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph, geometry: bpy.types.GeometrySet | None
-) -> list[Points]:
+def parts_of(obj: Object, depsgraph: Depsgraph, geometry: GeometrySet | None) -> list[Points]:
     """What holds the points of a field: meshes and point clouds of geometry; what is stored where that is None."""
     if geometry is not None and obj.type == 'MESH' and obj.data.is_editmode:
         # What is evaluated has no attributes then. Blender keeps this copy with the evaluated object, and frees it.
@@ -121,7 +120,7 @@ def parts_of(
     return [part for part in (geometry.mesh, geometry.pointcloud) if part is not None]
 
 
-def read_points(obj: bpy.types.Object, kinds: tuple[str, ...], parts: list[Points]) -> FieldPoints:
+def read_points(obj: Object, kinds: tuple[str, ...], parts: list[Points]) -> FieldPoints:
     """Points of a field of some kinds of plants.
 
     Raises
@@ -145,10 +144,10 @@ def read_points(obj: bpy.types.Object, kinds: tuple[str, ...], parts: list[Point
 
 def point_count(points: Points) -> int:
     """Number of points of a mesh or point cloud."""
-    return len(points.points if isinstance(points, bpy.types.PointCloud) else points.vertices)
+    return len(points.points if isinstance(points, PointCloud) else points.vertices)
 
 
-def _attribute(obj: bpy.types.Object, points: Points, name: str, kinds: Iterable[str]) -> bpy.types.Attribute | None:
+def _attribute(obj: Object, points: Points, name: str, kinds: Iterable[str]) -> Attribute | None:
     """An attribute, or the one that overrides it."""
     attributes, ours = points.attributes, name.startswith(PREFIX)
     found = attributes.get(name) if ours else attributes.get(PREFIX + name) or attributes.get(name)
@@ -161,7 +160,7 @@ def _attribute(obj: bpy.types.Object, points: Points, name: str, kinds: Iterable
     return found
 
 
-def _integers(obj: bpy.types.Object, points: Points, name: str, size: int, default: Integers | int) -> Integers:
+def _integers(obj: Object, points: Points, name: str, size: int, default: Integers | int) -> Integers:
     attribute = _attribute(obj, points, name, _SEEDS if name == "seed" else _INTEGERS)
     if attribute is None:
         return np.broadcast_to(np.asarray(default, np.int64), size)
@@ -169,7 +168,7 @@ def _integers(obj: bpy.types.Object, points: Points, name: str, size: int, defau
     return values.view(np.int64)[:, 0] if values.ndim > 1 else values.astype(np.int64)
 
 
-def _seeds(obj: bpy.types.Object, points: Points, size: int, first: int) -> Integers:
+def _seeds(obj: Object, points: Points, size: int, first: int) -> Integers:
     """Stored seeds, hashed where the object has a seed; without stored ones, hashes of the points' ids."""
     roll = obj.tetflora.seed
     stored = _attribute(obj, points, "seed", _SEEDS) is not None
@@ -177,7 +176,7 @@ def _seeds(obj: bpy.types.Object, points: Points, size: int, first: int) -> Inte
     return new_seeds(seeds, roll).astype(np.int64) if roll or not stored else seeds
 
 
-def _ages(obj: bpy.types.Object, points: Points, size: int) -> NDArray[np.floating]:
+def _ages(obj: Object, points: Points, size: int) -> NDArray[np.floating]:
     """Age of each point in years; that of the object without the attribute."""
     attribute = _attribute(obj, points, AGE, {'FLOAT', 'INT'})
     if attribute is not None:
@@ -186,7 +185,7 @@ def _ages(obj: bpy.types.Object, points: Points, size: int) -> NDArray[np.floati
     return np.broadcast_to(np.zeros(1) if own is None else own, size)
 
 
-def _rotations(obj: bpy.types.Object, points: Points, size: int) -> Floats:
+def _rotations(obj: Object, points: Points, size: int) -> Floats:
     """Rotation of each point in the field's space, (3, 3, n): numpy is fast with long rows."""
     attribute = _attribute(obj, points, "rotation", {'QUATERNION', 'FLOAT_VECTOR'})
     if attribute is None:
@@ -199,7 +198,7 @@ def _rotations(obj: bpy.types.Object, points: Points, size: int) -> Floats:
     return out
 
 
-def _scales(obj: bpy.types.Object, points: Points, size: int, least: int) -> Floats:
+def _scales(obj: Object, points: Points, size: int, least: int) -> Floats:
     """Scale of each point along its axes, (3, n), or (1, n) if uniform and ``least`` is 1."""
     attribute = _attribute(obj, points, "scale", {'FLOAT', 'FLOAT_VECTOR'})
     if attribute is None:
@@ -257,7 +256,7 @@ def placed_frames(world: Floats, rotation: Floats, scale: Floats) -> tuple[Float
     return turned, found, np.isfinite(turned.sum(axis=(1, 2))) & np.isfinite(found)
 
 
-def refuse(obj: bpy.types.Object, bad: Mask, what: str) -> None:
+def refuse(obj: Object, bad: Mask, what: str) -> None:
     """Raise `SceneError` where some points (n,) of a field are bad, with their number and the first one."""
     if bad.any():
         raise SceneError(
@@ -294,24 +293,24 @@ class History:
         return a, b, (now - self.year[a]) / np.maximum(self.year[b] - self.year[a], 1e-9)
 
 
-def has_history(obj: bpy.types.Object) -> bool:
+def has_history(obj: Object) -> bool:
     """Whether the points that a field stores are records of a history; cheap."""
     return isinstance(obj.data, Points) and YEAR in obj.data.attributes
 
 
-def year_curves(obj: bpy.types.Object) -> list[bpy.types.FCurve]:
+def year_curves(obj: Object) -> list[FCurve]:
     """Curves of keys of a stand's year."""
     return [curve for curve in curves_of(obj) if curve.data_path == YEAR_PATH]
 
 
-def clear_years(obj: bpy.types.Object) -> None:
+def clear_years(obj: Object) -> None:
     """Remove all keys of a stand's year."""
     for bag in bags_of(obj):
         for curve in [curve for curve in bag.fcurves if curve.data_path == YEAR_PATH]:
             bag.fcurves.remove(curve)
 
 
-def year_now(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> float:
+def year_now(obj: Object, depsgraph: Depsgraph) -> float:
     """Year in which a history is shown; also where the object is disabled in viewports, and Blender evaluates none."""
     evaluated = obj.evaluated_get(depsgraph) if obj.animation_data else obj
     curve = next((curve for curve in year_curves(obj) if not curve.mute), None)
@@ -320,7 +319,7 @@ def year_now(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> float:
     return max(curve.evaluate(depsgraph.scene.frame_current_final), 0.0)
 
 
-def stand_years(scene: bpy.types.Scene) -> list[float]:
+def stand_years(scene: Scene) -> list[float]:
     """Present years of all histories of a scene; at little cost where the file has none, whatever objects there are."""
     if not any(YEAR in data.attributes for data in (*bpy.data.meshes, *bpy.data.pointclouds)):
         return []
@@ -328,7 +327,7 @@ def stand_years(scene: bpy.types.Scene) -> list[float]:
     return [group.stand_year for obj in meshes if (group := obj.tetflora).is_field and has_history(obj)]
 
 
-def stored_now(obj: bpy.types.Object) -> Integers:
+def stored_now(obj: Object) -> Integers:
     """Numbers (m,) of the stored points of a field that are plants now: of a history, those of the present year."""
     points = obj.data
     if not has_history(obj):
@@ -340,7 +339,7 @@ def stored_now(obj: bpy.types.Object) -> Integers:
     return records.chosen(obj.tetflora.stand_year)[0]
 
 
-def read_sizes(obj: bpy.types.Object, parts: Sequence[Points]) -> Sizes | None:
+def read_sizes(obj: Object, parts: Sequence[Points]) -> Sizes | None:
     """Recorded sizes of the points of a field; None where none are stored.
 
     Raises
@@ -364,7 +363,7 @@ def read_sizes(obj: bpy.types.Object, parts: Sequence[Points]) -> Sizes | None:
     return Sizes(*rest, np.where(fit > 0.0, fit, 1.0))  # in the order of the names
 
 
-def read_records(obj: bpy.types.Object, parts: Sequence[Points]) -> History | None:
+def read_records(obj: Object, parts: Sequence[Points]) -> History | None:
     """Which records the points of a field are; None where they are plants.
 
     Raises
@@ -442,39 +441,35 @@ def _turned(rotation: NDArray, a: Integers, b: Integers, part: Floats) -> NDArra
     return one
 
 
-def _values(obj: bpy.types.Object, points: Points, name: str) -> Floats:
+def _values(obj: Object, points: Points, name: str) -> Floats:
     """An attribute in double precision; 0 where it is absent."""
     size, vector = point_count(points), SIZE_ATTRIBUTES[name] == 'FLOAT_VECTOR'
     found = _attribute(obj, points, name, {'FLOAT_VECTOR'} if vector else {'FLOAT', 'INT'})
     return np.zeros((size, 3) if vector else size) if found is None else values_of(found).astype(np.float64)
 
 
-def field_kinds(obj: bpy.types.Object) -> tuple[str, ...]:
+def field_kinds(obj: Object) -> tuple[str, ...]:
     """Kinds of plants that the attribute ``species`` of a field is an index into; at least one."""
     return tuple(kind_of_choice(entry) for entry in obj.tetflora.field_species) or (kind_of(obj),)
 
 
-def fields_of(objects: Iterable[bpy.types.Object]) -> list[bpy.types.Object]:
+def fields_of(objects: Iterable[Object]) -> list[Object]:
     """Those of the objects that are fields."""
     return [o for o in objects if o.tetflora.is_field]
 
 
-def stored_size(obj: bpy.types.Object) -> int:
+def stored_size(obj: Object) -> int:
     """Number of points that a field stores, before modifiers; cheap."""
     return point_count(obj.data) if isinstance(obj.data, Points) else 0
 
 
-def read_field(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph, matrices: Floats) -> Seeds:
+def read_field(obj: Object, depsgraph: Depsgraph, matrices: Floats) -> Seeds:
     """Plants of a field as `read_aged_field`, without their ages and sizes."""
     return read_aged_field(obj, depsgraph, matrices)[0]
 
 
 def read_aged_field(
-    obj: bpy.types.Object,
-    depsgraph: bpy.types.Depsgraph,
-    matrices: Floats,
-    keys: Keys | None = None,
-    geometry: bpy.types.GeometrySet | None = None,
+    obj: Object, depsgraph: Depsgraph, matrices: Floats, keys: Keys | None = None, geometry: GeometrySet | None = None
 ) -> tuple[Seeds, Floats | None, Sizes | None]:
     """Plants of a field, once for each of its places.
 
@@ -527,7 +522,7 @@ def read_aged_field(
     return seeds, ages, None if sizes is None else _placed_sizes(sizes, world)
 
 
-def stored_points(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> dict[str, tuple[str, NDArray]]:
+def stored_points(obj: Object, depsgraph: Depsgraph) -> dict[str, tuple[str, NDArray]]:
     """Attributes of the points of a field by name, each with its type and values, as they come from its modifiers.
 
     Only those by which points are plants; a field made of these, with the same matrix, has the same plants bit by bit.
@@ -552,12 +547,12 @@ def _placed_sizes(sizes: Sizes, world: Floats) -> Sizes:
 
 
 def read_field_matrices(
-    obj: bpy.types.Object,
-    depsgraph: bpy.types.Depsgraph,
+    obj: Object,
+    depsgraph: Depsgraph,
     matrices: Floats,
     wanted: Container[str],
     keys: Keys | None = None,
-    geometry: bpy.types.GeometrySet | None = None,
+    geometry: GeometrySet | None = None,
 ) -> Iterator[tuple[str, Integers, Floats]]:
     """Plants of a field of some species, with all of their transform: stretched and mirrored as the points are.
 
@@ -602,9 +597,7 @@ def _stretch(kind: str, sizes: Sizes) -> Floats:
     return np.where(known, np.stack([wide, wide, tall]), 1.0)
 
 
-def _read(
-    obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph, geometry: bpy.types.GeometrySet | None
-) -> tuple[FieldPoints, Sizes | None]:
+def _read(obj: Object, depsgraph: Depsgraph, geometry: GeometrySet | None) -> tuple[FieldPoints, Sizes | None]:
     """Points of a field that are plants, of a history those of its year, and their recorded sizes."""
     held = geometry or geometry_of(obj, depsgraph)  # it owns its parts
     if held is None and obj.evaluated_get(depsgraph).is_evaluated:
@@ -631,9 +624,9 @@ def write_field(
     species: Integers32,
     seed: Integers32,
     identifiers: Sequence[str],
-    forms: Sequence[bpy.types.Object | None] | None = None,
+    forms: Sequence[Object | None] | None = None,
     ages: NDArray[np.floating] | None = None,
-) -> bpy.types.Object:
+) -> Object:
     """Make a field: an object with a mesh of vertices, not linked to any collection yet.
 
     A mesh, no point cloud: its vertices are dots in viewports, not seen in renders, and every Blender can make it.

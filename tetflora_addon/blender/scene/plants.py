@@ -14,6 +14,7 @@ from typing import Self
 
 import bpy
 import numpy as np
+from bpy.types import Depsgraph, Object, Scene
 
 from ...arrays import Floats, Integers, Integers32
 from ...errors import SceneError, TetFloraError, listed
@@ -34,7 +35,7 @@ from .objects import Copies, copies_of, is_drop, may_instance, may_take_part, na
 from .skeletons import kind_of, kind_of_choice
 
 
-def gone_species(scene: bpy.types.Scene) -> set[str]:
+def gone_species(scene: Scene) -> set[str]:
     """Identifiers of those that populations of the scene strew, or that its file holds."""
     group, season = scene.tetflora, season_of(scene)
     names = set(edited_infos())
@@ -54,9 +55,7 @@ class NoPlantsError(SceneError):
     """There is nothing to refine; a render may go on without a message."""
 
 
-def read_plants(
-    scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph
-) -> tuple[Seeds, tuple[tuple[str, int], ...], str]:
+def read_plants(scene: Scene, depsgraph: Depsgraph) -> tuple[Seeds, tuple[tuple[str, int], ...], str]:
     """Enabled plants of a view layer that render: single ones by name, then instances, then fields.
 
     Plants and fields that collections or geometry nodes instance take part; each instance is an individual of its own.
@@ -99,7 +98,7 @@ class Source:
     look: str
     part: Part
     #: The field whose own points they are; None of instances and single plants.
-    field: bpy.types.Object | None = None
+    field: Object | None = None
 
     def without(self, species: Container[str]) -> Self:
         """The same without plants of some species."""
@@ -117,12 +116,12 @@ class _Found:
     """What takes part, before anybody asks whether its species are known."""
 
     sources: list[Source]
-    single: dict[str, list[bpy.types.Object]]  # plants that are objects, by look: they come first
+    single: dict[str, list[Object]]  # plants that are objects, by look: they come first
     odd: list[tuple[str, str]]  # names of objects with species that nobody has
-    own: list[bpy.types.Object]  # plants and fields of the view layer
+    own: list[Object]  # plants and fields of the view layer
     copies: list[Copies]
 
-    def nothing(self, scene: bpy.types.Scene) -> SceneError:
+    def nothing(self, scene: Scene) -> SceneError:
         """The error where no plant is left."""
         if self.odd:
             return SceneError(_unknown(self.odd))
@@ -143,7 +142,7 @@ class _Found:
         return NoPlantsError(f"No plants to render; {to_add}")
 
 
-def read_sources(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> list[Source]:
+def read_sources(scene: Scene, depsgraph: Depsgraph) -> list[Source]:
     """What `read_plants` reads, object by object, with ages and recorded sizes as they are stored.
 
     Raises
@@ -157,9 +156,7 @@ def read_sources(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> list
     return found.sources
 
 
-def _read_plants(
-    scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph
-) -> tuple[Seeds, tuple[tuple[str, int], ...], str]:
+def _read_plants(scene: Scene, depsgraph: Depsgraph) -> tuple[Seeds, tuple[tuple[str, int], ...], str]:
     found = _find_plants(scene, depsgraph)
     unknown = {species for _, species in found.odd}
     read = [some for source in found.sources if len((some := source.without(unknown)).part[1])]
@@ -175,7 +172,7 @@ def _read_plants(
     return merged(seen), tuple(owners), f"Left out {_unknown(found.odd)}" if found.odd else ""
 
 
-def _find_plants(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> _Found:
+def _find_plants(scene: Scene, depsgraph: Depsgraph) -> _Found:
     known, assets = catalog(), {*asset_species(scene), *gone_species(scene)}
     odd: list[tuple[str, str]] = []  # names of objects, each with a species
     objects = sorted(renderable_objects(depsgraph.view_layer), key=lambda o: o.name_full)
@@ -219,13 +216,13 @@ class AssetPlants:
     species: str  # identifier
     #: The original object that they are, that they are instances of, or whose points they are; several objects of a
     #: plant each, one for each place
-    owners: tuple[bpy.types.Object, ...]
+    owners: tuple[Object, ...]
     seed: Integers  # (n,)
     #: (n, 4, 4): To world space; stretched and mirrored as the objects, points and instances are
     matrices: Floats
 
 
-def read_asset_plants(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> list[AssetPlants]:
+def read_asset_plants(scene: Scene, depsgraph: Depsgraph) -> list[AssetPlants]:
     """Enabled plants of a view layer that render and whose species is an asset, in the order of `read_plants`.
 
     Objects that show a collection which is a species count as plants of it, each by itself, seeded by its name.
@@ -239,7 +236,7 @@ def read_asset_plants(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) ->
     if not assets:
         return []
     objects = sorted(renderable_objects(depsgraph.view_layer), key=lambda o: o.name_full)
-    single: dict[tuple[str, str], list[bpy.types.Object]] = {}
+    single: dict[tuple[str, str], list[Object]] = {}
     looks, fields, drops = LayerLooks(depsgraph.view_layer), [], []
     for obj in objects:
         group = obj.tetflora
@@ -278,7 +275,7 @@ def read_asset_plants(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) ->
     return found
 
 
-def single_plants(plants: list[bpy.types.Object], depsgraph: bpy.types.Depsgraph) -> Seeds:
+def single_plants(plants: list[Object], depsgraph: Depsgraph) -> Seeds:
     """Plants that are objects, in their order. Errors are those of `read_plants`."""
     groups = [obj.tetflora for obj in plants]
     names, own, known = [obj.name for obj in plants], [kind_of_choice(group) for group in groups], catalog()

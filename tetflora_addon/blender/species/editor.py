@@ -24,7 +24,7 @@ from .catalog import SpeciesChoice
 from .edits import catalog, change_species, species_data, species_for, tell_listeners
 
 #: Items of ``leaf_form`` and ``blossom_form`` that are no built-in model.
-OBJECT_LEAF, OWN_LEAF, NO_LEAF = "OBJECT", "OWN", "NONE"
+OBJECT, OWN, NONE = "OBJECT", "OWN", "NONE"
 _SIGNIFICANT = 6  # digits of a slider's single precision that count
 _kept: dict[tuple[str, ...], list[tuple[str, str, str, int]]] = {}  # Blender keeps no copy of the strings of items
 
@@ -154,10 +154,10 @@ def _order_items(editor: bpy.types.PropertyGroup, _context: Any) -> list[tuple[s
 
 _LEAF_ITEMS = [
     *((name, name.capitalize(), f"{m.polygons} faces", i) for i, (name, m) in enumerate(LEAF_MODELS.items())),
-    (OBJECT_LEAF, "Mesh Object", "Mesh object of this file, one unit long along +Y", len(LEAF_MODELS)),
-    (OWN_LEAF, "From Species File", "Polygons from the species file, or several forms", len(LEAF_MODELS) + 1),
+    (OBJECT, "Mesh Object", "Mesh object of this file, one unit long along +Y", len(LEAF_MODELS)),
+    (OWN, "From Species File", "Polygons from the species file, or several forms", len(LEAF_MODELS) + 1),
 ]  # fmt: skip
-_BLOSSOM_ITEMS = [*_LEAF_ITEMS, (NO_LEAF, "None", "The species has no blossoms or fruit", len(_LEAF_ITEMS))]
+_BLOSSOM_ITEMS = [*_LEAF_ITEMS, (NONE, "None", "The species has no blossoms or fruit", len(_LEAF_ITEMS))]
 
 
 def _forms(editor: bpy.types.PropertyGroup, kind: str) -> dict[str, Any]:
@@ -169,19 +169,19 @@ def _forms(editor: bpy.types.PropertyGroup, kind: str) -> dict[str, Any]:
 def _form(editor: bpy.types.PropertyGroup, kind: str) -> str:
     form = _forms(editor, kind)
     if "object" in form:
-        return OBJECT_LEAF
+        return OBJECT
     if kind == "blossom" and species_value(editor, kind, None) is None:
-        return NO_LEAF
+        return NONE
     model = form.get("model")  # of a file with errors anything at all
-    return model if isinstance(model, str) and model in LEAF_MODELS and "outline" not in form else OWN_LEAF
+    return model if isinstance(model, str) and model in LEAF_MODELS and "outline" not in form else OWN
 
 
 def _set_form(editor: bpy.types.PropertyGroup, kind: str, identifier: str) -> None:
-    if identifier == OBJECT_LEAF:
+    if identifier == OBJECT:
         set_species_value(editor, kind, {"object": str(_forms(editor, kind).get("object") or kind.capitalize())})
-    elif identifier == NO_LEAF:
+    elif identifier == NONE:
         set_species_value(editor, kind, None)
-    elif identifier != OWN_LEAF:  # polygons cannot be invented here
+    elif identifier != OWN:  # polygons cannot be invented here
         set_species_value(editor, kind, {"model": identifier})
 
 
@@ -191,7 +191,7 @@ def _form_property(kind: str, items: list[tuple[str, str, str, int]], name: str,
         description,
         items,
         get=lambda self: next(i for key, _, _, i in items if key == _form(self, kind)),
-        set=lambda self, number: _set_form(self, kind, {i: key for key, _, _, i in items}.get(number, OWN_LEAF)),
+        set=lambda self, number: _set_form(self, kind, {i: key for key, _, _, i in items}.get(number, OWN)),
     )
 
 
@@ -243,12 +243,7 @@ class TetFloraSpeciesEditor(bpy.types.PropertyGroup, SpeciesChoice):
         set=lambda self, number: setattr(self, "order_index", number),
     )
     preview_seed: integer(
-        "Seed",
-        "Individual of the species to show in the preview",
-        1,
-        min=0,
-        update=lambda _self, _context: tell_listeners(),
-        **FIXED,
+        "Seed", "Individual to show in the preview", 1, min=0, update=lambda _self, _context: tell_listeners(), **FIXED
     )
     species_name: _text("name", "Name", "Name shown in menus; the identifier that plants refer to does not change")
     species_description: _text("description", "Description", "Tooltip of the species in menus, in one sentence")
@@ -287,7 +282,7 @@ class TetFloraSpeciesEditor(bpy.types.PropertyGroup, SpeciesChoice):
     habit: _number(
         "habit",
         "Forest Habit",
-        "0: trees that stand free; 1: those of a dense stand, with bare, slender trunks and narrow crowns",
+        "0: trees that stand free; 1: those of dense stands, with bare trunks and narrow crowns",
     )
 
 

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 
 import bpy
 import numpy as np
+from bpy.types import Object, PropertyGroup, Scene
 from numpy.typing import NDArray
 
 from ...arrays import Floats, quaternions
@@ -77,17 +78,8 @@ def stand_site(ground: Terrain, soil: Soil) -> tuple[StandSite, Floats]:
     if not plantable.any():
         raise SceneError("Vertex Group, Areas, Paths or the biome's limits leave no ground for the stand; change them")
     moisture = np.full(height.shape, soil.moisture) + soil.relief * (wetness - _LEVEL)
-    site = StandSite(
-        0.0,
-        0.0,
-        grid.cell,
-        height,
-        plantable,
-        moisture,
-        np.full(height.shape, soil.fertility),
-        soil.degree_days,
-        soil.coldest_month,
-    )
+    fertility, climate = np.full(height.shape, soil.fertility), (soil.degree_days, soil.coldest_month)
+    site = StandSite(0.0, 0.0, grid.cell, height, plantable, moisture, fertility, *climate)
     return site, np.array([grid.west, grid.south])
 
 
@@ -158,18 +150,18 @@ _GROWING = (0.08, 0.85)  # fractions of the job: before, and while it grows
 class GrownStand:
     """What growing a stand made."""
 
-    field: bpy.types.Object
+    field: Object
     plants: int  # in the last year
     records: int
     years: int
 
 
-def is_stand(obj: bpy.types.Object | None) -> bool:
+def is_stand(obj: Object | None) -> bool:
     """Whether an object is a field that was grown as a stand."""
     return obj is not None and obj.tetflora.is_field and obj.tetflora.stand.is_grown
 
 
-def stand_settings_now(scene: bpy.types.Scene, field: bpy.types.Object) -> str:
+def stand_settings_now(scene: Scene, field: Object) -> str:
     """A short text that changes with the settings of a stand, for `TetFloraStand.grown_by`."""
     stand = field.tetflora.stand
     own = [p.identifier for p in stand.bl_rna.properties if p.type in {'INT', 'FLOAT', 'BOOLEAN', 'STRING'}]
@@ -179,7 +171,7 @@ def stand_settings_now(scene: bpy.types.Scene, field: bpy.types.Object) -> str:
     return digest(values + zone_values(scene, stand))
 
 
-def copy_stand(source: bpy.types.PropertyGroup, target: bpy.types.PropertyGroup) -> None:
+def copy_stand(source: PropertyGroup, target: PropertyGroup) -> None:
     """Give a stand the settings of another, and its species; a mixed forest where it has none."""
     for prop in source.bl_rna.properties:
         if prop.identifier not in _OWN:
@@ -195,10 +187,7 @@ def copy_stand(source: bpy.types.PropertyGroup, target: bpy.types.PropertyGroup)
 
 @job("Growing the stand")
 def new_stand_steps(
-    data: JobData,
-    grounds: Iterable[bpy.types.Object],
-    name: str = NAME,
-    fill: Callable[[bpy.types.PropertyGroup], None] | None = None,
+    data: JobData, grounds: Iterable[Object], name: str = NAME, fill: Callable[[PropertyGroup], None] | None = None
 ) -> Job[GrownStand]:
     """Grow a stand on meshes, by settings that a function fills in or by those of the scene for new ones.
 
@@ -239,7 +228,7 @@ def new_stand_steps(
 
 
 @job("Growing the stand")
-def again_steps(data: JobData, field: bpy.types.Object) -> Job[GrownStand]:
+def again_steps(data: JobData, field: Object) -> Job[GrownStand]:
     """Grow a stand again by its own settings, in place of its plants; as `new_stand_steps`."""
     grounds = [
         e.object for e in field.tetflora.stand.grounds if e.object is not None and data.scene in e.object.users_scene
@@ -248,7 +237,7 @@ def again_steps(data: JobData, field: bpy.types.Object) -> Job[GrownStand]:
     return (yield from _again_steps(data, field, grounds))
 
 
-def _again_steps(data: JobData, field: bpy.types.Object, grounds: list[bpy.types.Object]) -> Job[GrownStand]:
+def _again_steps(data: JobData, field: Object, grounds: list[Object]) -> Job[GrownStand]:
     scene, depsgraph, progress = data.scene, data.depsgraph, Progress(0.0, "Reading the ground")
     yield progress
     stand = field.tetflora.stand
@@ -328,7 +317,7 @@ def _columns(records: Records, site: StandSite, corner: Floats) -> tuple[Floats,
     return position, turn / np.linalg.norm(turn, axis=1, keepdims=True), records
 
 
-def _replace(field: bpy.types.Object, names: list[str], position: Floats, rotation: Floats, records: Records) -> None:
+def _replace(field: Object, names: list[str], position: Floats, rotation: Floats, records: Records) -> None:
     """Give a field the records in place of its points."""
     given = position, rotation, np.ones(len(records)), records.species, records.seed
     other = fields.write_field(NAME, *given, names)
@@ -349,7 +338,7 @@ def _size_columns(*sizes: NDArray) -> dict[str, NDArray]:
     return {**dict(zip(names, sizes, strict=True)), fields.OFFSET: np.pad(sizes[-1], ((0, 0), (0, 1)))}
 
 
-def _hand_over(other: bpy.types.Object, field: bpy.types.Object, columns: dict[str, NDArray]) -> None:
+def _hand_over(other: Object, field: Object, columns: dict[str, NDArray]) -> None:
     """Give a field the points of another, which goes, and columns of sizes."""
     for name, column in columns.items():
         write(other.data, name, column, data_type=fields.SIZE_ATTRIBUTES[name])
@@ -360,7 +349,7 @@ def _hand_over(other: bpy.types.Object, field: bpy.types.Object, columns: dict[s
     field.update_tag()
 
 
-def keep_year(field: bpy.types.Object) -> int:
+def keep_year(field: Object) -> int:
     """Make a field of the plants of a history in its present year; how many there are.
 
     Raises
@@ -398,7 +387,7 @@ def _stored(sizes: Sizes | None) -> dict[str, NDArray]:
     return found
 
 
-def animate(field: bpy.types.Object, first: int, last: int) -> tuple[float, float]:
+def animate(field: Object, first: int, last: int) -> tuple[float, float]:
     """Key the years of a history from a frame to another, evenly from 0 to the last one; returns both.
 
     Raises

@@ -79,10 +79,7 @@ class TetFloraStand(bpy.types.PropertyGroup, settings_in(StandSettings, options=
     )
     moisture: real("Moisture", "Moisture of level soil: 0 is dry, 0.5 fresh, 1 wet", 0.5, **_FACTOR)
     relief: real(
-        "By Relief",
-        "How much drier ridges are, and how much wetter valleys, by the shape of the ground",
-        0.5,
-        **_FACTOR,
+        "By Relief", "How much drier ridges are, and how much wetter valleys, by the ground's shape", 0.5, **_FACTOR
     )
     fertility: real("Fertility", "Soil: 0 is poor, 1 is rich", 0.7, **_FACTOR)
     slope_max: _RULES.slope_max

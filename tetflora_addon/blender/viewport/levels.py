@@ -12,6 +12,7 @@ from itertools import count
 
 import bpy
 import numpy as np
+from bpy.types import Collection, Depsgraph, Object, Scene
 from numpy.typing import NDArray
 
 from ...compiled.flora import Flora, compile_species
@@ -97,7 +98,7 @@ def level_steps(data: JobData) -> Generator[Progress, None, Levels]:
     return levels
 
 
-def read_shapes(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> Shapes | None:
+def read_shapes(scene: Scene, depsgraph: Depsgraph) -> Shapes | None:
     """Make the plants of a scene anew in the form that its settings say; None where they are not to be shown.
 
     What is wrong with a plant is reported by `Preview.message`, for the panel, and the earlier plants stay.
@@ -117,9 +118,7 @@ def read_shapes(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> Shape
     return preview.shapes
 
 
-def _shapes_of(
-    scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, make: Callable[[Flora, Seeds], Shapes]
-) -> Shapes:
+def _shapes_of(scene: Scene, depsgraph: Depsgraph, make: Callable[[Flora, Seeds], Shapes]) -> Shapes:
     """Plants that grow in the form of ``make``, and those that are assets as simple crowns."""
     crowns = _asset_crowns(scene, depsgraph, boxes=make is bounds_of_plants)
     try:
@@ -132,7 +131,7 @@ def _shapes_of(
     return joined([*grown, *crowns]) if crowns or len(grown) > 1 else grown[0]
 
 
-def _plants_of(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> tuple[Seeds, str]:
+def _plants_of(scene: Scene, depsgraph: Depsgraph) -> tuple[Seeds, str]:
     """Plants that grow and are not hidden in viewports, and which are left out."""
     seeds, _, message = read_plants(scene, depsgraph)
     seen = np.array(["hide_viewport" not in Kind.read(kind).look for kind in seeds.identifiers])
@@ -141,7 +140,7 @@ def _plants_of(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> tuple[
     return seeds.take(seen[seeds.species]), message
 
 
-def _asset_crowns(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, boxes: bool) -> list[Shapes]:
+def _asset_crowns(scene: Scene, depsgraph: Depsgraph, boxes: bool) -> list[Shapes]:
     found = []
     for plants in read_asset_plants(scene, depsgraph):
         crown, layer = crown_for(scene, plants.species), depsgraph.view_layer
@@ -153,11 +152,7 @@ def _asset_crowns(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, boxes:
 
 
 def _grown(
-    scene: bpy.types.Scene,
-    depsgraph: bpy.types.Depsgraph,
-    make: Callable[[Flora, Seeds], Shapes],
-    seeds: Seeds,
-    seen: InView | None = None,
+    scene: Scene, depsgraph: Depsgraph, make: Callable[[Flora, Seeds], Shapes], seeds: Seeds, seen: InView | None = None
 ) -> list[Shapes]:
     """Plants that grow in the form of ``make``; many kinds of them one by one, which are known from other years.
 
@@ -213,17 +208,17 @@ def _on_timer() -> float | None:
     return None
 
 
-def _on_update(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
+def _on_update(scene: Scene, depsgraph: Depsgraph) -> None:
     if scene.tetflora.preview.plants == 'NONE' or not on_main_thread():  # what a render changes is not the artist's
         return
     preview = find(scene)
     for update in depsgraph.updates:
         datablock = update.id
-        if isinstance(datablock, bpy.types.Object):
+        if isinstance(datablock, Object):
             own, placed = datablock.original.tetflora, update.is_updated_transform or update.is_updated_geometry
             changed = placed and (own.is_plant or own.is_field or is_drop(datablock.original))
         else:  # objects that are deleted or hidden are reported only as updates of what they are in
-            known = preview is not None and isinstance(datablock, bpy.types.Scene | bpy.types.Collection)
+            known = preview is not None and isinstance(datablock, Scene | Collection)
             now = (len(shown_objects(depsgraph.view_layer)), _moment(scene)) if known and not timeline_moves() else None
             changed = now is not None and now != (preview.objects, preview.moment)
         if changed:
@@ -231,7 +226,7 @@ def _on_update(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
             return
 
 
-def _on_frame(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph | None = None) -> None:
+def _on_frame(scene: Scene, depsgraph: Depsgraph | None = None) -> None:
     preview = find(scene)
     if scene.tetflora.preview.plants == 'NONE' or preview is None or preview.moment == _moment(scene):
         return
@@ -247,15 +242,13 @@ def _on_frame(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph | None = No
         read_shapes(scene, depsgraph)
 
 
-def _moved(depsgraph: bpy.types.Depsgraph) -> bool:
+def _moved(depsgraph: Depsgraph) -> bool:
     """Whether anything but a camera or a light is elsewhere than in the frame before."""
     changed = (u.id for u in depsgraph.updates if u.is_updated_transform or u.is_updated_geometry)
-    return any(not (isinstance(one, bpy.types.Object) and one.type in {'CAMERA', 'LIGHT'}) for one in changed)
+    return any(not (isinstance(one, Object) and one.type in {'CAMERA', 'LIGHT'}) for one in changed)
 
 
-def follow(
-    scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, preview: Preview, views: Sequence[NDArray[np.float64]]
-) -> None:
+def follow(scene: Scene, depsgraph: Depsgraph, preview: Preview, views: Sequence[NDArray[np.float64]]) -> None:
     """Show some of the plants in view, on the scene's day and in its year; they are read at the first frame only.
 
     Parameters
@@ -283,7 +276,7 @@ def follow(
     redraw('WINDOW')
 
 
-def _moment(scene: bpy.types.Scene) -> tuple:
+def _moment(scene: Scene) -> tuple:
     return season_of(scene), years_of(scene), stand_years(scene)
 
 
@@ -303,10 +296,7 @@ def _on_load_post(_path: object, _other: object = None) -> None:
 
 _HANDLERS = handlers(load_pre=_on_load_pre, load_post=_on_load_post)
 _IN_WINDOW = handlers(
-    depsgraph_update_post=_on_update,
-    frame_change_post=_on_frame,
-    undo_post=state.bring_in_step,
-    redo_post=state.bring_in_step,
+    depsgraph_update_post=_on_update, frame_change_post=_on_frame, undo_post=state.on_undo, redo_post=state.on_undo
 )
 
 

@@ -8,7 +8,7 @@ Batches that do not depend on the view are kept. Translucent tetrahedra are as m
 import sys
 import time
 import traceback
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from functools import cache
 from pathlib import Path
 
@@ -135,7 +135,7 @@ def _crown_shader() -> gpu.types.GPUShader:
     info = gpu.types.GPUShaderCreateInfo()
     info.push_constant('VEC4', "view")  # pixels of a meter at a depth of 1, how far one looks down, 0 to 1
     info.push_constant('VEC4', "eye")  # whence, and from which height over the distance on, plants have faces
-    return _shader("crown", info, passed, (('VEC3', "pos"), ('VEC4', "form"), ('VEC4', "look")))
+    return _shader("crown", info, passed, {"pos": 'VEC3', "form": 'VEC4', "look": 'VEC4'})
 
 
 @cache
@@ -143,18 +143,15 @@ def _faces_shader() -> gpu.types.GPUShader:
     """Opaque faces; Blender's own shader encodes colors again for each pixel."""
     passed = gpu.types.GPUStageInterfaceInfo("faces_interface")
     passed.smooth('VEC3', "linear")
-    return _shader("faces", gpu.types.GPUShaderCreateInfo(), passed, (('VEC3', "pos"), ('VEC4', "color")))
+    return _shader("faces", gpu.types.GPUShaderCreateInfo(), passed, {"pos": 'VEC3', "color": 'VEC4'})
 
 
 def _shader(
-    name: str,
-    info: gpu.types.GPUShaderCreateInfo,
-    passed: gpu.types.GPUStageInterfaceInfo,
-    columns: Iterable[tuple[str, str]],
+    name: str, info: gpu.types.GPUShaderCreateInfo, passed: gpu.types.GPUStageInterfaceInfo, columns: dict[str, str]
 ) -> gpu.types.GPUShader:
     """That of the files of a name, from columns of corners or points and their ``matrix`` to clip space."""
     info.push_constant('MAT4', "matrix")
-    for number, (kind, column) in enumerate(columns):
+    for number, (column, kind) in enumerate(columns.items()):
         info.vertex_in(number, kind, column)
     info.vertex_out(passed)
     info.fragment_out(0, 'VEC4', "fragColor")

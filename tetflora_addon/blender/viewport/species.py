@@ -110,13 +110,13 @@ def _remove() -> None:
     bpy.data.batch_remove([*objects, *{o.data for o in objects if is_ours(o.data)}, *_collections()])
 
 
-def _before_undo(_scene: bpy.types.Scene, _other: object = None) -> None:
+def _before(*_: object) -> None:
     if _objects() or _collections():
         _remove()
         switch.look()
 
 
-def _on_undo(_scene: bpy.types.Scene, _other: object = None) -> None:
+def _on_undo(*_: object) -> None:
     # Undo may also bring back a preview that was switched off since.
     if switch.scene is not None or _objects():
         switch.look()
@@ -133,10 +133,6 @@ switch = SceneSwitch(
     drawn=False,
 )
 _HANDLERS = handlers(
-    undo_pre=_before_undo,
-    redo_pre=_before_undo,
-    undo_post=_on_undo,
-    redo_post=_on_undo,
-    load_pre=lambda *_: switch.forget(),
+    undo_pre=_before, redo_pre=_before, undo_post=_on_undo, redo_post=_on_undo, load_pre=lambda *_: switch.forget()
 )
 register, unregister = in_order(switch, listening(switch.schedule, edits.listeners), _HANDLERS)

@@ -122,7 +122,7 @@ def freeze(scene: bpy.types.Scene, on: bool, depsgraph: Callable[[], bpy.types.D
     redraw()
 
 
-def bring_in_step(scene: bpy.types.Scene, *_: object) -> None:
+def on_undo(scene: bpy.types.Scene, *_: object) -> None:
     """After undo, which changes settings without a word: what is frozen, and shown of plants, follows them."""
     preview, settings = find(scene), scene.tetflora.preview
     if preview is not None:
@@ -163,12 +163,7 @@ class TetFloraPreview(bpy.types.PropertyGroup):
         "Color By",
         "What the colors of tetrahedra show",
         (
-            (
-                'FORM',
-                "Representation",
-                "Green becomes polygons, orange proxies; blue is hidden, white is split next",
-                0,
-            ),
+            ('FORM', "Representation", "Green becomes polygons, orange proxies; blue is hidden, white splits next", 0),
             ('LEVEL', "Level", "How often space was split: dark is rarely, bright is often", 1),
             ('VISIBILITY', "Visibility", "Fraction that the camera sees: dark is hidden", 2),
             ('CONTRIBUTION', "Contribution", "Number of pixels that it affects: dark is few, bright is many", 3),
@@ -206,10 +201,7 @@ class TetFloraPreview(bpy.types.PropertyGroup):
         update=lambda group, _context: plants_wanted(group.id_data),
     )
     statistics: boolean(
-        "Statistics",
-        "Show the level and the numbers of tetrahedra and polygons in the corner of the viewport",
-        True,
-        **_SHOWN,
+        "Statistics", "Show the level and numbers of tetrahedra and polygons in the viewport's corner", True, **_SHOWN
     )
     freeze: boolean(
         "Freeze Camera",
