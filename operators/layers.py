@@ -178,7 +178,7 @@ class TETFLORA_OT_update_layers(_InParts, Operator, label="Update", needs=_ACTIV
         if result is None:
             text = "No setting and no ground has changed since the layers were grown. If a mask, area or path has, "
             text += "choose Update This Layer in the menu beside the list"
-            if missing := [name for one in context.scene.tetflora.layers for name in grounds_seen(one)[1]]:
+            if missing := [name for one in context.scene.tetflora.layers for name in grounds_seen(one).missing]:
                 text = f'"{missing[0]}" is not in the scene; select a ground and choose Use Selected Meshes in the menu'
             self.report({'INFO'}, text)
             return {'CANCELLED'}

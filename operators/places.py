@@ -115,7 +115,10 @@ class TETFLORA_OT_import_terrain(_Raster, Operator, label="Import Terrain"):
     """Make ground from a raster of elevations, or from several tiles of one."""
 
     max_faces: once.integer(
-        "Max Faces", "Most faces; a finer raster is averaged in blocks", 500_000, **within(100, 4_000_000, 20_000_000)
+        "Max Faces",
+        "Faces at most; finer rasters are averaged in blocks",
+        500_000,
+        **within(100, 4_000_000, 20_000_000),
     )
     image: once.string(
         "Orthophoto",

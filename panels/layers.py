@@ -167,9 +167,9 @@ def TETFLORA_PT_layers(layout: bpy.types.UILayout, context: bpy.types.Context) -
     elif kind == GROUP:
         column.prop(layer, "gives_way")
     if (layer.kind != FIELD or kind == STAND) and (body := base.section(column, "Where", closed=False)):
-        names, missing, _ = grounds_seen(layer)
-        base.draw_below(body, names or "None", "Ground")
-        for name in missing[:3]:
+        seen = grounds_seen(layer)
+        base.draw_below(body, seen.names or "None", "Ground")
+        for name in seen.missing[:3]:
             base.draw_message(context, body, f'"{name}" is not in the scene; choose Use Selected Meshes in the menu')
         base.draw_where(body, owner)
     if layer.kind == SCATTER and (body := base.section(column, "Spacing and Size")):

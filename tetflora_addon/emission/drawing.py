@@ -249,7 +249,8 @@ def _tiles(given: Drawing) -> tuple[list[_Item], list[Arrays], list[Shown]]:
 def _drawn_tile(given: Drawing, item: _Item) -> list[Block | Parts | Shown]:
     """All that is drawn of one tile, or of parts that are out of view."""
     number, columns, parts, share = item
-    expected, known = FULL * (most := share * given.most), None
+    most = share * given.most
+    expected, known = FULL * most, None
     for left in reversed(range(_TRIES)):
         tile = _Tile(given, columns, not left)
         if columns is None:  # parts out of view, a share of all of them

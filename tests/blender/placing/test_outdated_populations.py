@@ -361,7 +361,7 @@ def test_where_it_stands_goes_neither_into_copies_nor_into_files():
 def test_a_ground_is_not_looked_at_while_panels_are_drawn(monkeypatch):
     """In a window; what was found last counts."""
     _on_ground('SCATTER')
-    seen = "ground", [], _population().stood_on
+    seen = rules.SeenGrounds("ground", (), _population().stood_on)
     monkeypatch.setattr(rules, "ground_form", lambda *_: pytest.fail("looked at a ground"))
     monkeypatch.setattr(rules.seen_grounds, "of", lambda *_: {_population().uid: seen})
     assert layers.is_due(_population())

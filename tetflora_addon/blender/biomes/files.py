@@ -22,19 +22,7 @@ from ...formats import FORMATS, newest
 from ...planting.site import Limits
 from ...species.catalog import species_from_dict
 from ..file_library import MAX_FILE_BYTES, as_text
-from ..placing.population_data import (
-    check_keys,
-    check_population,
-    check_settings,
-    check_species,
-    check_text,
-    check_value,
-    list_of,
-    population_data,
-    refuse_constant,
-    settings_data,
-    value_for,
-)
+from ..placing import population_data as stored
 from ..placing.properties import TetFloraLayer
 from ..placing.rules import MASK, active_population, biome_of, grounds_of, limits_of_zone
 from ..settings import BIOME, SCATTER, active_in
@@ -99,7 +87,7 @@ def _read(path: Path) -> tuple[Biome, bytes]:
     """A biome that was checked, and the content of its file."""
     try:
         content = read_whole(path, MAX_FILE_BYTES)
-        return checked(parse_json(content, refuse_constant), path.stem), content
+        return checked(parse_json(content, stored.refuse_constant), path.stem), content
     except OSError as error:
         raise SceneError(f"{path.name}: cannot read the file: {error.strerror}") from None
     except (ValueError, SpeciesError) as error:
@@ -121,17 +109,17 @@ def checked(data: Any, identifier: str) -> Biome:
             data = newest("biome", data, data["version"])
         except ValueError as error:
             raise ValueError(f'"version" {error}') from None
-    check_keys("the file", data, _KEYS, _KEYS | _MORE)
+    stored.check_keys("the file", data, _KEYS, _KEYS | _MORE)
     for key in ("name", "description"):
-        check_text(f'"{key}"', data.get(key, ""))
+        stored.check_text(f'"{key}"', data.get(key, ""))
     if not data["name"].strip():
         raise ValueError('"name" is empty')
     for key, known in (("limits", {one.name for one in fields(Limits)}), ("mask", set(MASK))):
-        check_keys(f'"{key}"', data.get(key, {}), set(), known)
-        check_settings(f'"{key}"', data.get(key, {}), TetFloraLayer, known)
-    check_value('"gives_way"', TetFloraLayer.bl_rna.properties["gives_way"], data.get("gives_way", True))
+        stored.check_keys(f'"{key}"', data.get(key, {}), set(), known)
+        stored.check_settings(f'"{key}"', data.get(key, {}), TetFloraLayer, known)
+    stored.check_value('"gives_way"', TetFloraLayer.bl_rna.properties["gives_way"], data.get("gives_way", True))
     ground = data.get("ground", {})
-    check_keys('"ground"', ground, set(), set(GROUND))
+    stored.check_keys('"ground"', ground, set(), set(GROUND))
     for key, value in ground.items():
         default, *limits = GROUND[key]
         parts = [value] if isinstance(default, float) else value
@@ -140,11 +128,11 @@ def checked(data: Any, identifier: str) -> Biome:
         for part in parts:
             _check_number(f'"ground": "{key}"', part, *limits)
     season = data.get("season", {})
-    check_keys('"season"', season, set(), set(SEASON))
+    stored.check_keys('"season"', season, set(), set(SEASON))
     for key, value in season.items():
         _check_number(f'"season": "{key}"', value, *SEASON[key])
     _check_species(data.get("species", {}))
-    layers = list_of("layers", data["layers"])
+    layers = stored.list_of("layers", data["layers"])
     if not layers:
         raise ValueError('"layers" is empty')
     for number, layer in enumerate(layers, 1):
@@ -157,9 +145,9 @@ def biome_data(
 ) -> dict[str, Any]:
     """Populations as the layers of a file, with the limits of their biome and species that only this file has."""
     data: dict[str, Any] = {"format": FORMAT, "version": FORMATS["biome"], "name": name, "description": description}
-    stored = data_of(biome) if biome is not None else {}
-    data |= {key: value for key, value in stored.items() if key in ("ground", "season") and value}
-    layers = [{"kind": "cover" if one.covers else "population", **population_data(one)} for one in populations]
+    begun = data_of(biome) if biome is not None else {}
+    data |= {key: value for key, value in begun.items() if key in ("ground", "season") and value}
+    layers = [{"kind": "cover" if one.covers else "population", **stored.population_data(one)} for one in populations]
     stands = [] if biome is None else [_stand_data(field) for field in stands_of(scene, biome.uid)]
     parts = [part for layer in (*stands, *layers) for part in layer["species"]]
     names = {part.get("shed_by", "") for part in parts} - {""}  # what they shed is made from them
@@ -169,11 +157,11 @@ def biome_data(
     if biome is not None:
         limits = limits_of_zone(biome)
         changed = {
-            one.name: value_for(TetFloraLayer.bl_rna.properties[one.name], getattr(limits, one.name))
+            one.name: stored.value_for(TetFloraLayer.bl_rna.properties[one.name], getattr(limits, one.name))
             for one in fields(Limits)
             if getattr(limits, one.name) not in (one.default, np.float32(one.metadata.get("default", one.default)))
         }
-        more |= {"limits": changed, "mask": settings_data(biome, MASK), "gives_way": biome.gives_way}
+        more |= {"limits": changed, "mask": stored.settings_data(biome, MASK), "gives_way": biome.gives_way}
     data |= {key: value for key, value in more.items() if value not in ({}, True)}  # what no file need say
     return data | {"layers": [*stands, *layers]}
 
@@ -181,8 +169,8 @@ def biome_data(
 def _stand_data(stand: Object) -> dict[str, Any]:
     """What differs from a new stand."""
     group = stand.tetflora.stand
-    layer = {"kind": "stand", "name": stand.name, **settings_data(group, stand_settings())}
-    return layer | {"species": [settings_data(entry, STAND_ENTRY, STAND_ENTRY) for entry in group.species]}
+    layer = {"kind": "stand", "name": stand.name, **stored.settings_data(group, stand_settings())}
+    return layer | {"species": [stored.settings_data(entry, STAND_ENTRY, STAND_ENTRY) for entry in group.species]}
 
 
 def active_biome(scene: Scene) -> PropertyGroup | None:
@@ -207,7 +195,7 @@ def _check_number(where: str, value: Any, low: float, high: float) -> None:
 
 
 def _check_species(species: Any) -> None:
-    check_keys('"species"', species, set(), set(species) if isinstance(species, Mapping) else set())
+    stored.check_keys('"species"', species, set(), set(species) if isinstance(species, Mapping) else set())
     for identifier, page in species.items():
         where = f'species "{identifier}"'
         if not is_identifier(identifier):
@@ -229,12 +217,12 @@ def _check_layer(where: str, layer: Any) -> None:
     if kind not in KINDS:
         raise ValueError(f'{where}: "kind" is {quoted(kind)}; it must be one of {", ".join(KINDS)}')
     if kind == "stand":
-        check_keys(where, layer, {"kind", "name", "species"}, {"kind", "name", "species", *stand_settings()})
-        check_text(f'{where}: "name"', layer["name"])
-        check_settings(where, layer, TetFloraStand, stand_settings())
-        check_species(where, layer["species"], TetFloraStandEntry, STAND_ENTRY)
+        stored.check_keys(where, layer, {"kind", "name", "species"}, {"kind", "name", "species", *stand_settings()})
+        stored.check_text(f'{where}: "name"', layer["name"])
+        stored.check_settings(where, layer, TetFloraStand, stand_settings())
+        stored.check_species(where, layer["species"], TetFloraStandEntry, STAND_ENTRY)
     else:
-        check_population(where, layer)
+        stored.check_population(where, layer)
         if not layer.get("species"):
             raise ValueError(f'{where} has no "species"')
 

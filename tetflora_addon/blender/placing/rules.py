@@ -15,7 +15,7 @@ from functools import cache, lru_cache
 from hashlib import blake2b
 from itertools import takewhile
 from math import inf
-from typing import Any
+from typing import Any, NamedTuple
 
 import bpy
 import numpy as np
@@ -209,15 +209,24 @@ def forms_of(grounds: Iterable[Object], form: Callable[[Object], str]) -> str:
     return " ".join(forms) if all(forms) else ""
 
 
-def ground_steps(scene: Scene, view_layer: ViewLayer) -> Generator[None, None, dict[str, tuple]]:
-    """Of each layer names of its grounds, those not in the scene, and where plants stood if one was changed since."""
+class SeenGrounds(NamedTuple):
+    """Of a layer: names of its grounds, those not in the scene, and where plants stood if one was changed since."""
+
+    names: str = "…"
+    missing: tuple[str, ...] = ()
+    stood_on: str = ""
+
+
+def ground_steps(scene: Scene, view_layer: ViewLayer) -> Generator[None, None, dict[str, SeenGrounds]]:
+    """What is to say of the grounds of each layer, by its identifier."""
     seen, form = {}, cache(lambda obj: ground_form(obj, view_layer.depsgraph))
     kept = [(one.uid, rules_of(one)) for one in scene.tetflora.layers]
     read = [(uid, one.stood_on, grounds_of(scene, one), [e.object for e in one.grounds]) for uid, one in kept]
     for uid, before, there, named in read:
         moved, present = before and lies_elsewhere(before, forms_of(there, form)), {None, *there}
         names = ", ".join(obj.name for obj in there[:2]) + (f" and {len(there) - 2:,} more" if len(there) > 2 else "")
-        seen[uid] = names, [obj.name for obj in named if obj not in present], before if moved else ""
+        missing = tuple(obj.name for obj in named if obj not in present)
+        seen[uid] = SeenGrounds(names, missing, before if moved else "")
         yield
     return seen
 
@@ -227,15 +236,14 @@ seen_grounds = Outlook(ground_steps)
 register, unregister = seen_grounds.register, seen_grounds.unregister
 
 
-def grounds_seen(layer: PropertyGroup) -> tuple[str, list[str], str]:
+def grounds_seen(layer: PropertyGroup) -> SeenGrounds:
     """What was found last of the grounds of a layer; cheap."""
-    seen = seen_grounds.of(layer.id_data, bpy.context.view_layer) or {}
-    return seen.get(layer.uid, ("…", [], ""))
+    return (seen_grounds.of(layer.id_data, bpy.context.view_layer) or {}).get(layer.uid, SeenGrounds())
 
 
 def on_changed_ground(layer: PropertyGroup) -> bool:
     """Whether a ground was changed, as it was found last, and the layer was not grown again since; cheap."""
-    return grounds_seen(layer)[-1] == rules_of(layer).stood_on != ""
+    return grounds_seen(layer).stood_on == rules_of(layer).stood_on != ""
 
 
 def free_seed(scene: Scene, seed: int) -> int:
