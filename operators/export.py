@@ -36,7 +36,7 @@ class TETFLORA_OT_export_forest(
         **within(1, 64, forest.MOST_VARIANTS),
     )
     levels: once.integer(
-        "Levels", "Levels with the full plant; 0 for as many as suit each species", **within(0, high=forest.LEVELS)
+        "Levels", "Levels of detail with the full plant; 0: what suits each species", **within(0, high=forest.LEVELS)
     )
     polygons: once.integer(
         "Max Polygons", "Leave out levels with more polygons than this; 0 for none", **within(0, 1_000_000, 100_000_000)

@@ -116,7 +116,7 @@ class TETFLORA_OT_import_terrain(_Raster, Operator, label="Import Terrain"):
 
     max_faces: once.integer(
         "Max Faces",
-        "Faces at most; finer rasters are averaged in blocks",
+        "Face limit; finer rasters are averaged in blocks",
         500_000,
         **within(100, 4_000_000, 20_000_000),
     )

@@ -360,7 +360,7 @@ class Order:
         Range(0, 0), -360, 360, "bend along the length; positive bends toward the parent", "degrees"
     )
     curvature_tip: float = limited(
-        ..., -360, 360, "bend of its outer half (default: same as curvature)", "degrees", follows="curvature"
+        ..., -360, 360, "bend of the outer half (default: same as curvature)", "degrees", follows="curvature"
     )
     attraction: Range = limited(
         Range(0, 0), -360, 360, "turn of a level branch toward the sky; negative turns down", "degrees"

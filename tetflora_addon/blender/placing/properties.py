@@ -260,7 +260,7 @@ class TetFloraLayer(PropertyGroup, settings_in(Limits, Rules, **LIVE), GroundMas
 
     grounds: list_of(TetFloraGround, "Grounds", "Meshes that the plants grow on")
     ground_collection: pointer_to(
-        Collection, "Ground Collection", "All meshes in this collection are ground too, also those added later", **LIVE
+        Collection, "Ground Collection", "All meshes in this collection are ground, even those added later", **LIVE
     )
     density: real(
         "Plants per Hectare",
