@@ -326,7 +326,7 @@ def dress(scene: bpy.types.Scene, view: View, camera: str, season: str) -> float
     high, tint = (min(view.sun[0], WINTER_SUN), look.tint) if snowy else (view.sun[0], view.tint)
     stage.sun(scene, high, view.sun[1] - 180.0, 5.0 * light, tint, 0.8)
     scene.world = sky(replace(look, clouds=view.clouds, strength=look.strength * light))
-    if eye:  # crowns from above are dark: the air before them would be half of what is seen
+    if eye:  # from above, what air adds over 140 m would veil the dark crowns
         add_haze(scene, *view.haze)
     return look.gray if snowy else view.gray if eye else ABOVE_GRAY
 
