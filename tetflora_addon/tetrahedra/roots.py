@@ -244,29 +244,11 @@ def _center(piece: _Piece) -> Floats:
 SMALLEST = 1.0
 
 
-def world_cubes(bounds: ArrayLike) -> tuple[float, Integers, Integers]:
-    """Cubes around a scene, at most two along each axis.
+def _world_cubes(bounds: Floats) -> tuple[float, Integers, Integers]:
+    """Cubes around the bounds (2, 3) of a scene: side, a power of two in meters; lowest corner (3,) in sides; how many.
 
-    Parameters
-    ----------
-    bounds : (2, 3) float64
-        Lowest and highest corner of what is in the scene, meters.
-
-    Returns
-    -------
-    side : float
-        Meters, a power of two.
-    low : (3,) int64
-        Lowest corner, in sides.
-    number : (3,) int64
-        Cubes along each axis, 1 or 2.
-
-    Raises
-    ------
-    ValueError
-        If the bounds are not finite.
+    These are 1 or 2 along each axis (3,). A ValueError if the bounds are not finite.
     """
-    bounds = np.asarray(bounds, np.float64)
     if not np.isfinite(bounds).all():
         raise ValueError("the bounds of the scene must be finite")
     longest = max(float(np.ptp(bounds, axis=0).max()), SMALLEST)
@@ -297,7 +279,7 @@ def world_root(bounds: ArrayLike, origin: ArrayLike = (0.0, 0.0, 0.0)) -> Tetrah
         If the bounds are not finite.
     """
     origin = np.asarray(origin, np.float64)
-    side, low, number = world_cubes(np.asarray(bounds, np.float64) + origin)
+    side, low, number = _world_cubes(np.asarray(bounds, np.float64) + origin)
     tree = TetrahedralTree()
     nodes, corners = np.zeros(1, np.intp), low[None]
     for axis in range(3):

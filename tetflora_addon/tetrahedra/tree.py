@@ -16,10 +16,13 @@ parts a from b and c from d; the planes of the corners do the rest. Every child 
 after three bisections. Faces are divided at the middles of their edges whatever the diagonal, so neighbors conform.
 """
 
+from dataclasses import dataclass, replace
+from typing import Self
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..arrays import Floats, Integers, Integers32, Mask
+from ..arrays import Arrays, Floats, Growing, Integers, Integers32, Mask, column
 from .geometry import EDGES, plane_distance, plane_through, quality, signed_volume, squared_edges
 
 #: Squared lengths that differ by less than this fraction count as equal, so that the choice of the edge does not depend
@@ -27,41 +30,24 @@ from .geometry import EDGES, plane_distance, plane_through, quality, signed_volu
 TIE = 1e-9
 
 
-def longest_edge(vertices: Floats) -> Integers:
-    """Index into `geometry.EDGES` of the longest edge; the first of those that are equally long.
-
-    Parameters
-    ----------
-    vertices : (n, 4, 3) float64
-        Tetrahedra, meters.
-
-    Returns
-    -------
-    (n,) intp
-    """
-    squared = squared_edges(vertices)
-    return np.argmax(squared >= np.max(squared, axis=1, keepdims=True) * (1.0 - TIE), axis=1)
+def _first_largest(values: Floats) -> Integers:
+    """Index (n,) of the largest of values (n, k); the first of those that are equally large."""
+    return np.argmax(values >= np.max(values, axis=1, keepdims=True) * (1.0 - TIE), axis=1)
 
 
-def bisect(vertices: Floats) -> tuple[Floats, Floats]:
-    """Cut tetrahedra in two at the midpoint of their longest edges.
+def _longest_edge(vertices: Floats) -> Integers:
+    """Index (n,) into `geometry.EDGES` of the longest edge of tetrahedra (n, 4, 3); the first of equal ones."""
+    return _first_largest(squared_edges(vertices))
 
-    Parameters
-    ----------
-    vertices : (n, 4, 3) float64
-        Positively oriented tetrahedra, meters.
 
-    Returns
-    -------
-    planes : (n, 4) float64
-        Cutting planes ``(nx, ny, nz, d)``, unit normals.
-    children : (n, 2, 4, 3) float64
-        Child 0 on the negative side of the plane, child 1 on the positive one; positively oriented, half the volume
-        each. A child keeps its parent's vertices in their places but for the midpoint, so that what both share has
-        the same coordinates to the last bit.
+def _bisect(vertices: Floats) -> tuple[Floats, Floats]:
+    """Planes (n, 4) through the midpoints of the longest edges of tetrahedra (n, 4, 3), and both halves (n, 2, 4, 3).
+
+    Child 0 lies on the negative side. A child keeps its parent's vertices in their places but for the midpoint, so that
+    what both share has the same coordinates to the last bit.
     """
     every = np.arange(len(vertices))
-    edge = longest_edge(vertices)
+    edge = _longest_edge(vertices)
     start, end = EDGES[edge].T
     opposite = EDGES[5 - edge]
     middle = (vertices[every, start] + vertices[every, end]) / 2.0
@@ -108,21 +94,9 @@ def _tables() -> tuple[Integers, Integers]:
 _CHILDREN, _PLANES = _tables()
 
 
-def best_diagonal(vertices: Floats) -> Integers:
-    """Diagonal along which the worst of the inner tetrahedra has the best quality.
+def _best_diagonal(vertices: Floats) -> Integers:
+    """Diagonal (n,) along which the worst inner piece of tetrahedra (n, 4, 3) has the best quality; the first of equals.
 
-    Parameters
-    ----------
-    vertices : (n, 4, 3) float64
-        Tetrahedra, meters.
-
-    Returns
-    -------
-    (n,) intp
-        Diagonal ``k`` joins the middles of edges ``k`` and ``5 - k`` of `geometry.EDGES`; the first of equal ones.
-
-    Notes
-    -----
     All children have the same volume. Let S be the sum of the squared edges, D² the squared diagonal, and p and q the
     squares of the edges whose middles it joins. Two of the inner tetrahedra have edges of (S − p + 4 D²) / 4, two of
     (S − q + 4 D²) / 4, where 4 D² = S − 2 (p + q). The three 4 D² add up to S, so that of the shortest diagonal is
@@ -132,70 +106,42 @@ def best_diagonal(vertices: Floats) -> Integers:
     """
     squared = squared_edges(vertices)
     p, q = squared[:, :3], squared[:, :2:-1]
-    spared = 2.0 * (p + q) + np.minimum(p, q)
-    return np.argmax(spared >= np.max(spared, axis=1, keepdims=True) * (1.0 - TIE), axis=1)
+    return _first_largest(2.0 * (p + q) + np.minimum(p, q))
 
 
-def divide_in_eight(vertices: Floats, diagonal: Integers | None = None) -> tuple[Floats, Floats]:
-    """Divide tetrahedra into eight of the same volume.
+def _divide_in_eight(vertices: Floats, diagonal: Integers) -> tuple[Floats, Floats]:
+    """Planes (n, 7, 4) and eight children (n, 8, 4, 3) of tetrahedra (n, 4, 3), along diagonals (n,) as of `_NAMES`.
 
-    Parameters
-    ----------
-    vertices : (n, 4, 3) float64
-        Positively oriented tetrahedra, meters.
-    diagonal : (n,) int, optional
-        Which diagonal of the inner octahedron to cut along; `best_diagonal` if None.
-
-    Returns
-    -------
-    planes : (n, 7, 4) float64
-        Cutting planes ``(nx, ny, nz, d)``, unit normals, in the order of a heap: plane ``i`` is followed by plane
-        ``2 i + 1`` on side 0 and by plane ``2 i + 2`` on side 1.
-    children : (n, 8, 4, 3) float64
-        Positively oriented; child ``4 s + 2 t + u`` on sides ``s``, ``t``, ``u`` of three planes; the even are corners.
+    Planes are in the order of a heap: plane ``i`` is followed by plane ``2 i + 1`` on side 0 and by ``2 i + 2`` on side
+    1. Child ``4 s + 2 t + u`` lies on sides ``s``, ``t``, ``u`` of three of them; the even ones are corners.
     """
-    diagonal = best_diagonal(vertices) if diagonal is None else diagonal
     points = np.concatenate([vertices, (vertices[:, EDGES[:, 0]] + vertices[:, EDGES[:, 1]]) / 2.0], axis=1)
     every = np.arange(len(vertices))[:, None, None]
     through = points[every, _PLANES[diagonal]]
     return plane_through(through[..., :3, :], through[..., 3, :]), points[every, _CHILDREN[diagonal]]
 
 
-def divide_by_shape(vertices: Floats) -> tuple[Floats, Floats]:
-    """Divide tetrahedra ``(n, 4, 3)`` into eight in the way that keeps them in better shape, so that no slivers arise.
+def _divide_by_shape(vertices: Floats) -> tuple[Floats, Floats]:
+    """Planes and children as of `_divide_in_eight`, or of three bisections where these leave better shapes.
 
     Both ways give eight of equal volume, three planes deep. The worst quality counts, bisection's with a `HANDICAP`.
-
-    Parameters
-    ----------
-    vertices : (n, 4, 3) float64
-        Positively oriented tetrahedra, meters.
-
-    Returns
-    -------
-    planes : (n, 7, 4) float64
-        In the order of a heap, see `divide_in_eight`.
-    children : (n, 8, 4, 3) float64
-        Positively oriented, of equal volume.
-
-    Notes
-    -----
     The paper "chooses a subdivision depending on the aspect ratio of the resulting tetrahedra in order to avoid sliver
     subvolumes" (section 4). The eight leave compact shapes at least three quarters of their quality, but cannot help
     with long ones: where opposite edges differ much, all three diagonals are equally bad. Those gain by bisection.
     """
-    (planes, children), (other, halves) = divide_in_eight(vertices), bisect_thrice(vertices)
+    planes, children = _divide_in_eight(vertices, _best_diagonal(vertices))
+    other, halves = _bisect_thrice(vertices)
     handicap = np.where(quality(vertices) > COMPACT, HANDICAP, 1.0 + TIE)
     bisected = handicap * np.min(quality(children), axis=1) < np.min(quality(halves), axis=1)
     planes[bisected], children[bisected] = other[bisected], halves[bisected]
     return planes, children
 
 
-def bisect_thrice(vertices: Floats) -> tuple[Floats, Floats]:
-    """Longest-edge bisection of tetrahedra ``(n, 4, 3)`` three times; planes and children as `divide_in_eight`."""
+def _bisect_thrice(vertices: Floats) -> tuple[Floats, Floats]:
+    """Longest-edge bisection of tetrahedra ``(n, 4, 3)`` three times; planes and children as `_divide_in_eight`."""
     planes, pieces = [], vertices
     for cuts in (1, 2, 4):
-        cutting, pieces = bisect(pieces)
+        cutting, pieces = _bisect(pieces)
         planes.append(cutting.reshape(len(vertices), cuts, 4))
         pieces = pieces.reshape(-1, 4, 3)
     return np.concatenate(planes, axis=1), pieces.reshape(len(vertices), 8, 4, 3)
@@ -205,55 +151,61 @@ def bisect_thrice(vertices: Floats) -> tuple[Floats, Floats]:
 POINT_BATCH = 1 << 18
 
 
+@dataclass(frozen=True)
+class _Nodes(Arrays):
+    """Nodes (n) of a tree; see its properties."""
+
+    plane: Floats = column(4)
+    children: Integers32 = column(2, dtype=np.int32)
+    parent: Integers32 = column(dtype=np.int32)
+    level: NDArray[np.int16] = column(dtype=np.int16)
+    inside: Mask = column(dtype=bool)
+    vertices: Floats = column(4, 3)
+
+    @classmethod
+    def terminal(cls, parent: Integers32, level: NDArray[np.int16], inside: Mask) -> Self:
+        """Nodes that are not divided and have no tetrahedra."""
+        known = {"parent": parent, "level": level, "inside": inside}
+        new = replace(cls.zeros(len(parent)), **known)
+        new.children[:], new.vertices[:] = -1, np.nan
+        return new
+
+
 class TetrahedralTree:
     """Binary tree of planes over a convex region of space.
 
     Node 0 is the root. Inner nodes near it may be convex regions without a tetrahedron; terminal nodes are tetrahedra
     once `split` is used (`tetflora_addon.tetrahedra.roots` sees to that). Between a tetrahedron and those that
     `split_by_shape` makes of it there may be such regions too.
-
-    Parameters
-    ----------
-    vertices : (4, 3) float64, optional
-        Tetrahedron of the root, positively oriented, meters. Without it the root is a region for `divide`.
     """
 
     def __init__(self) -> None:
-        self._size = 0
-        self._made = 0
-        self._rows = {
-            "plane": np.zeros((0, 4)),
-            "children": np.zeros((0, 2), np.int32),
-            "parent": np.zeros(0, np.int32),
-            "level": np.zeros(0, np.int16),
-            "inside": np.zeros(0, np.bool_),
-            "vertices": np.zeros((0, 4, 3)),
-        }
+        root = _Nodes.terminal(np.full(1, -1, np.int32), np.zeros(1, np.int16), np.zeros(1, bool))
+        self._nodes, self._made = Growing(root), 0
         self._inner_by_level: tuple[int, list[Integers]] = (-1, [])
-        self._append(np.full(1, -1, np.int32), np.zeros(1, np.int16), np.zeros(1, np.bool_))
 
     def __len__(self) -> int:
-        return self._size
+        return len(self._nodes)
 
     @property
     def children(self) -> Integers32:
         """Node numbers ``(len, 2)`` of the children on sides 0 and 1; −1 where the node is terminal."""
-        return self._rows["children"][: self._size]
+        return self._nodes.rows.children
 
     @property
     def parent(self) -> Integers32:
         """Parent ``(len,)`` of each node; −1 for the root."""
-        return self._rows["parent"][: self._size]
+        return self._nodes.rows.parent
 
     @property
     def level(self) -> NDArray[np.int16]:
         """Steps ``(len,)`` from the root to each node."""
-        return self._rows["level"][: self._size]
+        return self._nodes.rows.level
 
     @property
     def inside(self) -> Mask:
         """Whether each node ``(len,)`` lies within the view for which the root was made."""
-        return self._rows["inside"][: self._size]
+        return self._nodes.rows.inside
 
     @property
     def tetrahedra_made(self) -> int:
@@ -268,15 +220,15 @@ class TetrahedralTree:
     @property
     def nbytes(self) -> int:
         """Bytes that the arrays take, spare rows included."""
-        return sum(rows.nbytes for rows in self._rows.values())
+        return self._nodes.nbytes
 
     def vertices(self, nodes: ArrayLike) -> Floats:
         """Tetrahedra ``(n, 4, 3)`` float64 of nodes ``(n,)``, meters; NaN for regions without one."""
-        return np.take(self._rows["vertices"][: self._size], nodes, axis=0)
+        return np.take(self._nodes.rows.vertices, nodes, axis=0)
 
     def planes(self, nodes: ArrayLike) -> Floats:
         """Cutting planes ``(n, 4)`` float64 of nodes ``(n,)``; zeros where the node is terminal."""
-        return np.take(self._rows["plane"][: self._size], nodes, axis=0)
+        return np.take(self._nodes.rows.plane, nodes, axis=0)
 
     def terminals(self) -> Integers:
         """Numbers ``(t,)`` of the nodes that are not divided, ascending."""
@@ -301,7 +253,7 @@ class TetrahedralTree:
             If a node is not terminal, has no tetrahedron, or occurs twice.
         """
         nodes = np.asarray(nodes, np.intp)
-        planes, halves = bisect(self._tetrahedra(nodes))
+        planes, halves = _bisect(self._tetrahedra(nodes))
         children = self.divide(nodes, planes)
         self.place(children.ravel(), halves.reshape(-1, 4, 3))
         return children
@@ -317,7 +269,7 @@ class TetrahedralTree:
         Returns
         -------
         (n, 8) int32
-            Terminals three levels further down, see `tree.divide_by_shape`; they inherit `inside`.
+            Terminals three levels further down; they inherit `inside`.
 
         Raises
         ------
@@ -325,7 +277,7 @@ class TetrahedralTree:
             If a node is not terminal, has no tetrahedron, or occurs twice.
         """
         nodes = np.asarray(nodes, np.intp)
-        planes, pieces = divide_by_shape(self._tetrahedra(nodes))
+        planes, pieces = _divide_by_shape(self._tetrahedra(nodes))
         for first, end in ((0, 1), (1, 3), (3, 7)):  # planes are in the order of a heap
             nodes = self.divide(nodes, planes[:, first:end].reshape(-1, 4)).reshape(-1)
         self.place(nodes, pieces.reshape(-1, 4, 3))
@@ -354,20 +306,15 @@ class TetrahedralTree:
         nodes = np.asarray(nodes, np.intp)
         if (self.children[nodes, 0] >= 0).any() or (len(nodes) and np.bincount(nodes).max() > 1):
             raise ValueError("only terminal nodes can be split, and each only once")
-        first = self._size
-        self._append(
-            np.repeat(nodes.astype(np.int32), 2),
-            np.repeat(self.level[nodes] + np.int16(1), 2),
-            np.repeat(self.inside[nodes], 2),
-        )
-        made = np.arange(first, self._size, dtype=np.int32).reshape(-1, 2)
-        self.children[nodes] = made
-        self._rows["plane"][nodes] = planes
+        columns = nodes.astype(np.int32), self.level[nodes] + np.int16(1), self.inside[nodes]
+        made = np.arange(len(self), len(self) + 2 * len(nodes), dtype=np.int32).reshape(-1, 2)
+        self._nodes.append(_Nodes.terminal(*(np.repeat(values, 2) for values in columns)))
+        self.children[nodes], self._nodes.rows.plane[nodes] = made, planes
         return made
 
     def place(self, nodes: ArrayLike, vertices: ArrayLike) -> None:
         """Give nodes ``(n,)`` that have none their tetrahedra ``(n, 4, 3)``, positively oriented, meters."""
-        self._rows["vertices"][nodes] = vertices
+        self._nodes.rows.vertices[nodes] = vertices
         self._made += len(np.atleast_1d(nodes))
 
     def order(
@@ -400,10 +347,10 @@ class TetrahedralTree:
         if eye is None and direction is None:
             raise ValueError("a visibility order requires an eye or a direction")
         children, inner = self.children, self._levels_of_inner()
-        count = np.ones(self._size, np.int32)
+        count = np.ones(len(self), np.int32)
         for nodes in reversed(inner):
             count[nodes] = count[children[nodes, 0]] + count[children[nodes, 1]]
-        place = np.zeros(self._size, np.int32)
+        place = np.zeros(len(self), np.int32)
         for nodes in inner:
             planes = self.planes(nodes)
             if eye is not None:
@@ -456,28 +403,11 @@ class TetrahedralTree:
 
     def _levels_of_inner(self) -> list[Integers]:
         """Inner nodes of each level that has some, from the root down; kept until the tree grows."""
-        if self._inner_by_level[0] != self._size:
+        if self._inner_by_level[0] != len(self):
             inner = np.flatnonzero(self.children[:, 0] >= 0)
             levels = self.level[inner]
             # Stable sorting of 16-bit integers is a radix sort: linear in the number of nodes.
             by_level = inner[np.argsort(levels, kind="stable")]
             groups = np.split(by_level, np.cumsum(np.bincount(levels))[:-1]) if len(inner) else []
-            self._inner_by_level = (self._size, groups)
+            self._inner_by_level = (len(self), groups)
         return self._inner_by_level[1]
-
-    def _append(self, parent: Integers32, level: NDArray[np.int16], inside: Mask) -> None:
-        """Add terminal nodes without tetrahedra; capacity doubles, so that each row is copied twice on average."""
-        start, end = self._size, self._size + len(parent)
-        if end > len(self._rows["parent"]):
-            capacity = max(64, end, 2 * len(self._rows["parent"]))
-            for name, rows in self._rows.items():
-                grown = np.zeros((capacity, *rows.shape[1:]), rows.dtype)
-                grown[:start] = rows[:start]
-                self._rows[name] = grown
-        new = slice(start, end)
-        self._rows["parent"][new] = parent
-        self._rows["level"][new] = level
-        self._rows["inside"][new] = inside
-        self._rows["children"][new] = -1
-        self._rows["vertices"][new] = np.nan
-        self._size = end

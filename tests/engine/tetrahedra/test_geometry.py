@@ -9,7 +9,7 @@ from hypothesis.extra.numpy import arrays
 
 from tests.engine.support import contains, face_planes
 from tetflora_addon.tetrahedra import geometry
-from tetflora_addon.tetrahedra.tree import bisect, longest_edge
+from tetflora_addon.tetrahedra.tree import _bisect, _longest_edge
 
 REGULAR = np.array([[1.0, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]])
 CORNER = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]])
@@ -68,7 +68,7 @@ def test_barycentric_coordinates_give_the_point_back(vertices, point):
 @given(positive())
 @settings(deadline=None)
 def test_bisection_halves_the_volume(vertices):
-    planes, children = bisect(vertices[None])
+    planes, children = _bisect(vertices[None])
     volumes = geometry.signed_volume(children[0])
     np.testing.assert_allclose(volumes, geometry.signed_volume(vertices) / 2, rtol=1e-9)
     distance = geometry.plane_distance(planes[0], children[0])
@@ -82,8 +82,8 @@ def test_bisection_halves_the_volume(vertices):
 def test_bisection_cuts_the_longest_edge_only(vertices, order):
     shuffled = vertices[list(order)]
     squared = geometry.squared_edges(shuffled)
-    assert squared[longest_edge(shuffled[None])[0]] >= squared.max() * (1 - 1e-8)
-    _, children = bisect(shuffled[None])
+    assert squared[_longest_edge(shuffled[None])[0]] >= squared.max() * (1 - 1e-8)
+    _, children = _bisect(shuffled[None])
     kept = [(child[:, None] == shuffled).all(-1).any(1).sum() for child in children[0]]
     assert kept == [3, 3]
     middle = [child[~(child[:, None] == shuffled).all(-1).any(1)][0] for child in children[0]]
@@ -92,12 +92,12 @@ def test_bisection_cuts_the_longest_edge_only(vertices, order):
 
 def test_equal_edges_are_told_apart_the_same_way_after_rounding():
     shaken = REGULAR + np.random.default_rng(0).uniform(-1e-13, 1e-13, (200, 4, 3))
-    assert (longest_edge(shaken) == longest_edge(REGULAR[None])).all()
+    assert (_longest_edge(shaken) == _longest_edge(REGULAR[None])).all()
 
 
 def test_no_tetrahedra():
     nothing = np.zeros((0, 4, 3))
-    planes, children = bisect(nothing)
+    planes, children = _bisect(nothing)
     assert planes.shape == (0, 4)
     assert children.shape == (0, 2, 4, 3)
     assert geometry.quality(nothing).shape == (0,)

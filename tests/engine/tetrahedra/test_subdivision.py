@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from tetflora_addon.camera.camera import Camera
 from tetflora_addon.tetrahedra import geometry
 from tetflora_addon.tetrahedra.roots import view_root
-from tetflora_addon.tetrahedra.tree import best_diagonal, bisect, bisect_thrice, divide_by_shape, divide_in_eight
+from tetflora_addon.tetrahedra.tree import _best_diagonal, _bisect, _bisect_thrice, _divide_by_shape, _divide_in_eight
 
 SEEDS = st.integers(0, 10**9)
 
@@ -38,6 +38,11 @@ def shapes(vertices, root):
     alike = np.round(np.log(geometry.squared_edges(vertices)) * 1e6)
     kept = np.unique(np.column_stack([alike, root]), axis=0, return_index=True)[1]
     return vertices[kept], root[kept]
+
+
+def divided_best(vertices):
+    """Planes and children of the eight along the best diagonals."""
+    return _divide_in_eight(vertices, _best_diagonal(vertices))
 
 
 def squared_diagonals(vertices: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -75,10 +80,10 @@ def test_eight_of_equal_volume_each_on_its_side(seed):
     vertices = positive(rng, 50)
     which = rng.integers(0, 3, len(vertices))
     for planes, children in (
-        divide_in_eight(vertices),
-        divide_in_eight(vertices, which),
-        bisect_thrice(vertices),
-        divide_by_shape(vertices),
+        divided_best(vertices),
+        _divide_in_eight(vertices, which),
+        _bisect_thrice(vertices),
+        _divide_by_shape(vertices),
     ):
         eighth = np.repeat(geometry.signed_volume(vertices)[:, None] / 8, 8, axis=1)
         np.testing.assert_allclose(geometry.signed_volume(children), eighth, rtol=1e-11)
@@ -98,7 +103,7 @@ def test_corners_are_the_whole_at_half_size_and_the_rest_shares_the_diagonal(see
     rng = np.random.default_rng(seed)
     vertices = positive(rng, 30)
     which = rng.integers(0, 3, len(vertices))
-    _, children = divide_in_eight(vertices, which)
+    _, children = _divide_in_eight(vertices, which)
     quality = geometry.quality(vertices)[:, None]
     np.testing.assert_allclose(geometry.quality(children[:, ::2]), np.repeat(quality, 4, axis=1), rtol=1e-9)
     squared = squared_diagonals(vertices)[np.arange(len(vertices)), which]
@@ -119,7 +124,7 @@ def test_neighbors_divide_their_common_face_alike(seed, order, other_order):
         vertices = vertices[list(turn)]
         if geometry.signed_volume(vertices) < 0:
             vertices = vertices[[1, 0, 2, 3]]
-        children = divide_in_eight(vertices[None])[1][0]
+        children = divided_best(vertices[None])[1][0]
         on = np.abs(geometry.plane_distance(face, children)) < 1e-9
         found.append({frozenset(map(tuple, c[o])) for c, o in zip(children, on, strict=True) if o.sum() == 3})
     assert found[0] == found[1]
@@ -130,12 +135,12 @@ def test_neighbors_divide_their_common_face_alike(seed, order, other_order):
 @settings(deadline=None, max_examples=30)
 def test_best_diagonal_is_the_best_and_keeps_three_quarters(seed):
     vertices = positive(np.random.default_rng(seed), 200)
-    best = geometry.quality(divide_in_eight(vertices)[1]).min(axis=1)
+    best = geometry.quality(divided_best(vertices)[1]).min(axis=1)
     for other in range(3):
-        worst = geometry.quality(divide_in_eight(vertices, np.full(200, other))[1]).min(axis=1)
+        worst = geometry.quality(_divide_in_eight(vertices, np.full(200, other))[1]).min(axis=1)
         assert (best >= worst * (1 - 1e-8)).all()
     assert (best > 0.75 * geometry.quality(vertices)).all()
-    assert (best_diagonal(vertices) < 3).all()
+    assert (_best_diagonal(vertices) < 3).all()
 
 
 @given(st.floats(0.1, 1.5), st.floats(0.4, 1.0), st.floats(-0.3, 0.3), st.floats(-0.3, 0.3))
@@ -143,11 +148,11 @@ def test_best_diagonal_is_the_best_and_keeps_three_quarters(seed):
 def test_eight_levels_of_a_view_pyramid_keep_their_shape(half_width, aspect, across, up):
     half_height = half_width * aspect
     window = (across - half_width, across + half_width, up - half_height, up + half_height)
-    worst = worst_over_levels(halves(window), lambda v: divide_by_shape(v)[1], 8)
+    worst = worst_over_levels(halves(window), lambda v: _divide_by_shape(v)[1], 8)
     # Long lenses have slender pyramids, which keep a little less.
     assert (worst >= (0.8 if half_width >= 0.3 else 0.7) * worst[0]).all(), (worst.min(axis=0) / worst[0]).min()
     if 0.4 < half_width < 0.7 and max(abs(across), abs(up)) < 0.1:
-        worst = worst_over_levels(halves(window), lambda v: divide_in_eight(v)[1], 8)
+        worst = worst_over_levels(halves(window), lambda v: divided_best(v)[1], 8)
         assert (worst >= 0.8 * worst[0]).all(), (worst.min(axis=0) / worst[0]).min()
 
 
@@ -159,21 +164,21 @@ def test_eight_levels_around_a_view_keep_their_shape(kind):
     )
     tree = view_root(camera, np.array([[-40.0, -30.0, 0.0], [30.0, 50.0, 20.0]]))
     vertices = tree.vertices(tree.terminals())
-    worst = worst_over_levels(vertices, lambda v: divide_by_shape(v)[1], 8)
+    worst = worst_over_levels(vertices, lambda v: _divide_by_shape(v)[1], 8)
     assert (worst >= 0.8 * worst[0]).all(), (worst.min(axis=0) / worst[0]).min()
     # The eight alone keep less of what is long and thin.
-    worst = worst_over_levels(vertices, lambda v: divide_in_eight(v)[1], 8)
+    worst = worst_over_levels(vertices, lambda v: divided_best(v)[1], 8)
     assert (worst > 0.74 * worst[0]).all()
 
 
 def test_longest_diagonal_makes_slivers():
     pair = halves((-0.5, 0.5, -0.28, 0.28))
-    longest = worst_over_levels(pair, lambda v: divide_in_eight(v, np.argmax(squared_diagonals(v), axis=1))[1], 8)
+    longest = worst_over_levels(pair, lambda v: _divide_in_eight(v, np.argmax(squared_diagonals(v), axis=1))[1], 8)
     assert longest.min() < 0.05
 
 
 def test_bisection_over_thirty_generations_makes_no_slivers():
-    worst = worst_over_levels(halves((-0.5, 0.5, -0.28, 0.28)), lambda v: bisect(v)[1], 30)
+    worst = worst_over_levels(halves((-0.5, 0.5, -0.28, 0.28)), lambda v: _bisect(v)[1], 30)
     assert worst.min() > 0.337
 
 
@@ -183,13 +188,13 @@ def test_division_follows_shape():
     both = np.stack([regular, needle])
     if geometry.signed_volume(regular) < 0:
         both[0] = both[0, [1, 0, 2, 3]]
-    planes, children = divide_by_shape(both)
-    for one, expected in enumerate((divide_in_eight(both), bisect_thrice(both))):
+    planes, children = _divide_by_shape(both)
+    for one, expected in enumerate((divided_best(both), _bisect_thrice(both))):
         np.testing.assert_array_equal(planes[one], expected[0][one])
         np.testing.assert_array_equal(children[one], expected[1][one])
 
 
 def test_no_tetrahedra():
     nothing = np.zeros((0, 4, 3))
-    for planes, children in (divide_in_eight(nothing), bisect_thrice(nothing), divide_by_shape(nothing)):
+    for planes, children in (divided_best(nothing), _bisect_thrice(nothing), _divide_by_shape(nothing)):
         assert planes.shape == (0, 7, 4) and children.shape == (0, 8, 4, 3)

@@ -14,7 +14,7 @@ from tests.engine.refinement.test_loop import check, run
 from tetflora_addon.refinement.decisions import ACROSS_THE_BORDER, Decision
 from tetflora_addon.refinement.settings import RefinementSettings
 from tetflora_addon.tetrahedra.geometry import quality, volume
-from tetflora_addon.tetrahedra.roots import world_cubes, world_root
+from tetflora_addon.tetrahedra.roots import _world_cubes, world_root
 from tetflora_addon.tetrahedra.tree import TetrahedralTree
 
 corners = st.tuples(*[st.floats(-3000, 3000, allow_subnormal=False)] * 3)
@@ -26,7 +26,7 @@ corners = st.tuples(*[st.floats(-3000, 3000, allow_subnormal=False)] * 3)
 @settings(deadline=None, max_examples=40)
 def test_the_root_fills_cubes_around_the_scene(low: tuple, size: tuple) -> None:
     bounds = np.array([low, np.add(low, size)])
-    side, first, number = world_cubes(bounds)
+    side, first, number = _world_cubes(bounds)
     assert np.log2(side) % 1 == 0
     assert np.isin(number, [1, 2]).all()
     assert (first * side <= bounds[0]).all()
