@@ -115,9 +115,8 @@ def clear(folder: Path | None = None, names: re.Pattern[str] | None = None) -> i
                 Path(entry).unlink(missing_ok=True)
                 number += 1
     except OSError as error:
-        raise TetFloraError(
-            f"Cannot clear the cache folder {folder}: {error.strerror}. Check its permissions"
-        ) from None
+        problem = f"Cannot clear the cache folder {folder}: {error.strerror}. Check its permissions"
+        raise TetFloraError(problem) from None
     return number
 
 
@@ -138,7 +137,7 @@ def read_arrays(path: Path, most: int, checked: Callable[[Mapping[str, NDArray]]
     """
     try:
         content = read_whole(path, most)
-        refuse_packed(content, most)
+        _refuse_packed(content, most)
         with np.load(io.BytesIO(content), allow_pickle=False) as stored:
             result = checked(stored)
     except FileNotFoundError:
@@ -151,13 +150,8 @@ def read_arrays(path: Path, most: int, checked: Callable[[Mapping[str, NDArray]]
     return result
 
 
-def refuse_packed(content: bytes, most: int) -> None:
-    """Refuse an archive that would take more memory than it has bytes: ours are not compressed, and say their size.
-
-    Raises
-    ------
-    ValueError
-    """
+def _refuse_packed(content: bytes, most: int) -> None:
+    """Refuse an archive that would take more memory than it has bytes: ours are not compressed, and say their size."""
     with zipfile.ZipFile(io.BytesIO(content)) as archive:
         for info in archive.infolist():
             if info.compress_type != zipfile.ZIP_STORED or info.file_size > most:
@@ -177,12 +171,12 @@ def write_arrays(path: Path, names: re.Pattern[str], most: int, **arrays: NDArra
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         write_whole(path_in(path.parent, path.name), content.getvalue())
-        make_room(path.parent, names, most)
+        _make_room(path.parent, names, most)
     except OSError as error:
         warn(f"cannot write to the cache folder {path.parent}: {error.strerror}")
 
 
-def make_room(folder: Path | None, names: re.Pattern[str], most: int) -> None:
+def _make_room(folder: Path, names: re.Pattern[str], most: int) -> None:
     """Delete this user's files of some names in a folder, longest unused first, down to ``most`` bytes; and left-overs.
 
     Any may be gone: other processes tidy up as well. What others own counts for them alone, or they could empty it.

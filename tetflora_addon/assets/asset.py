@@ -162,19 +162,12 @@ class AssetTable:
         sample = np.cumsum([0, *(len(a.samples) for a in assets)])
         moved = []
         for asset, first, at in zip(assets, root[:-1].tolist(), sample[:-1].tolist(), strict=True):
-            own = asset.clusters
-            moved.append(
-                replace(
-                    own,
-                    parent=np.where(own.parent < 0, -1, own.parent + first).astype(np.int32),
-                    child=(own.child + np.int32(first)).astype(np.int32),
-                    leaf_sample=own.leaf_sample + np.int32(at),
-                    wood_sample=own.wood_sample + np.int32(at),
-                )
-            )
-        return cls(
-            tuple(assets), Clusters.concatenate(moved), SurfaceSamples.concatenate([a.samples for a in assets]), root
-        )
+            own, cluster, number = asset.clusters, np.int32(first), np.int32(at)
+            parent = np.where(own.parent < 0, own.parent, own.parent + cluster)
+            samples = {"leaf_sample": own.leaf_sample + number, "wood_sample": own.wood_sample + number}
+            moved.append(replace(own, parent=parent, child=own.child + cluster, **samples))
+        samples = SurfaceSamples.concatenate([a.samples for a in assets])
+        return cls(tuple(assets), Clusters.concatenate(moved), samples, root)
 
     def __getstate__(self) -> dict[str, object]:
         """Without what meshes of clusters are made of, and without copies: other processes draw leaves and facets."""

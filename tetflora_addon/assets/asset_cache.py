@@ -42,9 +42,8 @@ def keep(asset: Asset) -> None:
     path = _path(asset.digest)
     if path is None:
         return
-    columns = {
-        f"{name}.{f.name}": getattr(getattr(asset, name), f.name) for name, kind in _KINDS.items() for f in fields(kind)
-    }
+    every = ((name, f.name) for name, kind in _KINDS.items() for f in fields(kind))
+    columns = {f"{name}.{own}": getattr(getattr(asset, name), own) for name, own in every}
     columns |= {"name": np.array(asset.name), "digest": np.array(asset.digest), "part": asset.part, "face": asset.face}
     storage.write_arrays(path, _NAMES, _MOST_FILES, **columns)
 

@@ -36,13 +36,10 @@ _TURN, _PICK = 245, 246
 _CORNERS = np.array([[0.0, 1.0], [-np.sqrt(3) / 2, -0.5], [np.sqrt(3) / 2, -0.5]]) * 2 / 27**0.25
 
 
-def facet_weights_of(
-    clusters: Clusters, samples: SurfaceSamples, triangles: Callable[[int], Iterator[Run]], start: float = 0.0
+def _facet_weights(
+    clusters: Clusters, samples: SurfaceSamples, triangles: Callable[[int], Iterator[Run]]
 ) -> Generator[float, None, Floats]:
-    """Weights (c, counts) for each of `asset.COUNTS`; yields the fraction that is done, from a start to 1.
-
-    triangles: those of a cluster, in runs.
-    """
+    """Weights (c, counts) for each of `asset.COUNTS`, by the triangles of a cluster in runs; yields what is done."""
     depth = np.zeros(len(clusters), np.int64)
     while (deeper := np.where(clusters.parent >= 0, depth[clusters.parent] + 1, 0)).max() > depth.max():
         depth = deeper
@@ -54,7 +51,7 @@ def facet_weights_of(
         for cluster in some.tolist():
             found += _looked(clusters, samples, cluster, triangles(cluster))
         weights[depth == level] = _fitting(found)
-        yield start + (1.0 - start) * (level + 1) / (int(depth.max()) + 1)
+        yield 0.85 + 0.15 * (level + 1) / (int(depth.max()) + 1)
     return weights
 
 
@@ -169,10 +166,9 @@ def compile_steps(source: AssetSource) -> Generator[float, None, Asset]:
     pool = patch_table_of(source, tuple(patches))
     hierarchy = hierarchy_of(pool.center, pool.triangles, pool.kind)
     parts: list[Measured] = []
-    number = int((hierarchy.children == 0).sum())
     for run in runs_of(source, pool, hierarchy):
         parts.append(measured(run))
-        yield 0.5 + 0.35 * float(run.cluster[-1] + 1) / number
+        yield 0.5 + 0.35 * float(run.cluster[-1] + 1) / len(hierarchy.smallest)
     clusters, samples = _clusters(hierarchy, parts)
     if not clusters.optical_area[0] > 0.0:
         raise TetFloraError(f'"{source.name}": all of its faces are transparent or have no area; choose another object')
@@ -181,18 +177,15 @@ def compile_steps(source: AssetSource) -> Generator[float, None, Asset]:
         first, last = _smallest(hierarchy)[1][:, cluster]
         return runs_of(source, pool, hierarchy, int(first), int(last))
 
-    weights = yield from facet_weights_of(clusters, samples, triangles, 0.85)
+    weights = yield from _facet_weights(clusters, samples, triangles)
     part, face = (np.concatenate([getattr(p, name) for p in parts]) for name in ("part", "face"))
-    clusters = replace(clusters, weights=weights)
-    return Asset(
-        source.name, source.digest, clusters, samples, AssetKites.concatenate([p.leaves for p in parts]), part, face
-    )
+    clusters, leaves = replace(clusters, weights=weights), AssetKites.concatenate([p.leaves for p in parts])
+    return Asset(source.name, source.digest, clusters, samples, leaves, part, face)
 
 
 def _smallest(hierarchy: Hierarchy) -> tuple[Integers, Integers]:
     """Clusters (k,) without children, in their order, and which of these each cluster has: (2, c), first and end."""
-    small = np.flatnonzero(hierarchy.children == 0)
-    small = small[np.argsort(hierarchy.first[small], kind="stable")]
+    small = hierarchy.smallest
     ends = [np.searchsorted(hierarchy.first[small], of) for of in (hierarchy.first, hierarchy.last)]
     return small, np.stack(ends)
 
@@ -251,9 +244,8 @@ def _samples_above(
         place = done[first[inner], kind][owner] + within[owner, kind] * at
         smallest = np.clip(np.searchsorted(done[:, kind], place, side="right") - 1, 0, len(areas) - 1)
         inside = (place - done[smallest, kind]) / np.maximum(areas[smallest, kind], 1e-300)
-        index = np.clip(
-            (inside * counts[smallest, kind]).astype(np.int64), 0, np.maximum(counts[smallest, kind] - 1, 0)
-        )
+        many = counts[smallest, kind]
+        index = np.clip((inside * many).astype(np.int64), 0, np.maximum(many - 1, 0))
         picks.append(begin[smallest] + (counts[smallest, 0] if kind else 0) + index)
         owners.append(owner)
     return samples.take(np.concatenate(picks)[np.argsort(np.concatenate(owners), kind="stable")]), wanted

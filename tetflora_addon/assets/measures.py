@@ -24,65 +24,6 @@ _DIAMETER, _NARROW, _WIDE = 4.0, 0.02, 1.5
 _PLANE = 248
 
 
-def kites_of(
-    corners: Floats,
-    optical: Floats,
-    normal: Floats,
-    color: NDArray[np.floating],
-    transmission: NDArray[np.floating],
-    roughness: NDArray[np.floating],
-    first: Integers,
-    number: Integers,
-) -> AssetKites:
-    """Kites for leaves that are runs of triangles.
-
-    Parameters
-    ----------
-    corners : (t, 3, 3) float64
-    optical : (t,) float64
-        Area that each blocks, m².
-    normal : (t, 3) float64
-        Unit vectors.
-    color, transmission, roughness : (t, 3), (t,), (t,) float
-    first : (l,) int
-        First triangle of each leaf, ascending from 0 on.
-    number : (l,) int
-        Of each leaf, from which the choice of its plane follows.
-    """
-    area = np.add.reduceat(optical, first)
-    whole = np.maximum(area, 1e-300)[:, None]
-    middle = corners.mean(axis=1)
-    counted = np.maximum(optical, 1e-200)[:, None]  # leaves of no area are somewhere, too
-    center = np.add.reduceat(counted * middle, first, axis=0) / np.add.reduceat(counted, first, axis=0)
-    leaf = np.repeat(np.arange(len(first)), np.diff(np.append(first, len(optical))))
-    # Second moments of triangles: a twelfth of the sum over corners, and nine twelfths of the middle.
-    away = np.concatenate([corners, np.sqrt(9.0) * middle[:, None]], axis=1)
-    away[:, :3] -= center[leaf][:, None]
-    away[:, 3] -= 3.0 * center[leaf]
-    spread = np.zeros((len(first), 3, 3))
-    for i in range(3):
-        for j in range(i, 3):
-            own = (away[:, :, i] * away[:, :, j]).sum(axis=1) / 12.0
-            spread[:, i, j] = spread[:, j, i] = np.add.reduceat(optical * own, first) / whole[:, 0]
-    values, vectors = np.linalg.eigh(spread)
-    done = np.cumsum(optical)
-    at = (done - optical)[first] + uniform(key_of_seed(number), _PLANE) * area
-    pick = np.clip(np.searchsorted(done, at, side="right"), first, np.append(first[1:], len(optical)) - 1)
-    plane, long = normal[pick], vectors[:, :, 2]
-    along = long - np.einsum("ni,ni->n", long, plane)[:, None] * plane
-    flat = np.linalg.norm(along, axis=1) < 0.1  # a face across the leaf, as of its rim: any direction will do
-    along[flat] = vectors[flat, :, 1] - np.einsum("ni,ni->n", vectors[flat, :, 1], plane[flat])[:, None] * plane[flat]
-    along = unit(along)
-    length = _DIAMETER * np.sqrt(np.maximum(values[:, 2], 0.0))
-    side = np.sqrt(area)
-    length = np.clip(length, side * np.sqrt(2.0 / _WIDE), side * np.sqrt(2.0 / _NARROW))
-    width = 2.0 * area / np.maximum(length, 1e-300)
-    mean = np.add.reduceat(optical[:, None] * color, first, axis=0) / whole
-    through, rough = (np.add.reduceat(optical * own, first) / whole[:, 0] for own in (transmission, roughness))
-    along, across = length[:, None] / 2 * along, width[:, None] / 2 * np.cross(plane, along)
-    return AssetKites.typed(center, along, across, mean, through, rough)
-
-
 def kite_mesh(leaves: AssetKites) -> MeshBuffers:
     """Kites (l,) as a mesh with the attributes that the material of proxies reads."""
     corners = [leaves.center - leaves.along, leaves.center - leaves.across]
@@ -172,8 +113,7 @@ def runs_of(
     source: AssetSource, pool: PatchTable, hierarchy: Hierarchy, first: int = 0, last: int | None = None
 ) -> Iterator[Run]:
     """Triangles of the smallest clusters from one to before another, some clusters at a time."""
-    small = np.flatnonzero(hierarchy.children == 0)
-    small = small[np.argsort(hierarchy.first[small], kind="stable")][first:last]
+    small = hierarchy.smallest[first:last]
     done = np.concatenate([[0], np.cumsum(pool.triangles[hierarchy.order], dtype=np.int64)])
     load = done[hierarchy.last[small]] - done[hierarchy.first[small]]
     for run in chunks(load, BATCH):
@@ -238,9 +178,8 @@ def measured(run: Run) -> Measured:
     normal = vector / np.maximum(size, 1e-300)[:, None]
     shown = size * run.coverage
     optical = np.where(run.solid, 0.5, 1.0) * shown
-    columns = [np.where(run.solid, 0.0, shown), np.where(run.solid, shown, 0.0), optical]
-    columns += [run.new_face, run.new_patch & ~run.woody, np.where(run.solid & ~run.woody, shown, 0.0)]
-    columns += [optical * run.width]
+    columns = [np.where(run.solid, 0.0, shown), np.where(run.solid, shown, 0.0), optical, run.new_face]
+    columns += [run.new_patch & ~run.woody, np.where(run.solid & ~run.woody, shown, 0.0), optical * run.width]
     columns += [optical * run.color[:, k] for k in range(3)] + [optical * run.transmission]
     columns += [optical * normal[:, i] * normal[:, j] for i, j in _PAIRS]
     sums = np.stack([np.add.reduceat(column.astype(np.float64), start) for column in columns], axis=1)
@@ -259,18 +198,45 @@ def measured(run: Run) -> Measured:
 
 
 def _leaves(run: Run, optical: Floats, normal: Floats) -> AssetKites:
-    """Patches that are not wood, as kites."""
+    """Patches that are not wood, as kites; triangles have optical areas (t,), m², and normals (t, 3)."""
     some = np.flatnonzero(~run.woody)
     if not len(some):
         return AssetKites.empty()
-    first = np.flatnonzero(run.new_patch[some])
-    number = (
-        run.cluster[some][first] * _MANY
-        + np.arange(len(first))
-        - np.searchsorted(run.cluster[some][first], run.cluster[some][first])
-    )
-    seen = run.corners[some], optical[some], normal[some], run.color[some], run.transmission[some], run.roughness[some]
-    return kites_of(*seen, first, number)
+    corners, optical, normal, new = run.corners[some], optical[some], normal[some], run.new_patch[some]
+    first, leaf = np.flatnonzero(new), np.cumsum(new) - 1
+    cluster = run.cluster[some[first]]
+    number = cluster * _MANY + np.arange(len(first)) - np.searchsorted(cluster, cluster)
+    area = np.add.reduceat(optical, first)
+    whole = np.maximum(area, 1e-300)[:, None]
+    middle = corners.mean(axis=1)
+    counted = np.maximum(optical, 1e-200)[:, None]  # leaves of no area are somewhere, too
+    center = np.add.reduceat(counted * middle, first, axis=0) / np.add.reduceat(counted, first, axis=0)
+    # Second moments of triangles: a twelfth of the sum over corners, and nine twelfths of the middle.
+    away = np.concatenate([corners, np.sqrt(9.0) * middle[:, None]], axis=1)
+    away[:, :3] -= center[leaf][:, None]
+    away[:, 3] -= 3.0 * center[leaf]
+    spread = np.zeros((len(first), 3, 3))
+    for i in range(3):
+        for j in range(i, 3):
+            own = (away[:, :, i] * away[:, :, j]).sum(axis=1) / 12.0
+            spread[:, i, j] = spread[:, j, i] = np.add.reduceat(optical * own, first) / whole[:, 0]
+    values, vectors = np.linalg.eigh(spread)
+    done = np.cumsum(optical)
+    at = (done - optical)[first] + uniform(key_of_seed(number), _PLANE) * area
+    pick = np.clip(np.searchsorted(done, at, side="right"), first, np.append(first[1:], len(optical)) - 1)
+    plane, long = normal[pick], vectors[:, :, 2]
+    along = long - np.einsum("ni,ni->n", long, plane)[:, None] * plane
+    flat = np.linalg.norm(along, axis=1) < 0.1  # a face across the leaf, as of its rim: any direction will do
+    along[flat] = vectors[flat, :, 1] - np.einsum("ni,ni->n", vectors[flat, :, 1], plane[flat])[:, None] * plane[flat]
+    along = unit(along)
+    length = _DIAMETER * np.sqrt(np.maximum(values[:, 2], 0.0))
+    side = np.sqrt(area)
+    length = np.clip(length, side * np.sqrt(2.0 / _WIDE), side * np.sqrt(2.0 / _NARROW))
+    width = 2.0 * area / np.maximum(length, 1e-300)
+    mean = np.add.reduceat(optical[:, None] * run.color[some], first, axis=0) / whole
+    looks = (np.add.reduceat(optical * own[some], first) / whole[:, 0] for own in (run.transmission, run.roughness))
+    along, across = length[:, None] / 2 * along, width[:, None] / 2 * np.cross(plane, along)
+    return AssetKites.typed(center, along, across, mean, *looks)
 
 
 def shared_out(leaf: Floats, wood: Floats, number: int) -> Integers:

@@ -14,6 +14,7 @@ vertices at the same place are merged: many files split them at seams.
 """
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -36,7 +37,7 @@ _ONE_OF_MANY = 1 / 64
 _ROUNDS = 6
 
 
-def classified(positions: Floats, corner_verts: Integers, face_offsets: Integers) -> tuple[Mask, Mask, Floats]:
+def _classified(positions: Floats, corner_verts: Integers, face_offsets: Integers) -> tuple[Mask, Mask, Floats]:
     """Classify the faces of a mesh.
 
     Parameters
@@ -141,9 +142,8 @@ def _mean_curvature(
     Faces that are turned inside out would make it negative; what counts is its amount.
     """
     normal = vector / np.maximum(area, 1e-300)[:, None]
-    angle = np.arctan2(
-        np.linalg.norm(np.cross(normal[a], normal[b]), axis=1), np.einsum("ni,ni->n", normal[a], normal[b])
-    )
+    sine, cosine = np.linalg.norm(np.cross(normal[a], normal[b]), axis=1), np.einsum("ni,ni->n", normal[a], normal[b])
+    angle = np.arctan2(sine, cosine)
     bulge = np.einsum("ni,ni->n", normal[a] - normal[b], center[a] - center[b])
     own = 0.25 * length * angle * np.sign(bulge)  # half of ½ l θ to either face
     own[(area[a] <= 0) | (area[b] <= 0)] = 0.0
@@ -156,8 +156,8 @@ def _mean_curvature(
     return np.abs(integral) / np.maximum(around, 1e-300)
 
 
-#: `classified`, its results kept for as long as there is room: each frame of an animation needs the same again.
-mesh_features = memoized(MOST_BYTES)(classified)
+#: `_classified`, its results kept for as long as there is room: each frame of an animation needs the same again.
+mesh_features = memoized(MOST_BYTES)(_classified)
 
 
 #: Faces of a patch at most; an island with more is cut into pieces of about so many that lie together.
@@ -264,7 +264,7 @@ def _features(surface: AssetSurface, triangle: Integers32, island: Integers32) -
         used, vertex = np.unique(corners, return_inverse=True)
         offsets = np.arange(0, corners.size + 1, 3)
         positions = surface.positions[used].astype(np.float64)
-        solid[run], _, width[run] = classified(positions, vertex.reshape(-1).astype(np.int32), offsets)
+        solid[run], _, width[run] = _classified(positions, vertex.reshape(-1).astype(np.int32), offsets)
     return solid, width
 
 
@@ -313,6 +313,12 @@ class Hierarchy:
     #: child and children, (c,): first child, and how many there are; 0 where there are none.
     child: Integers32
     children: Integers32
+
+    @cached_property
+    def smallest(self) -> Integers:
+        """Clusters (k,) without children, in the order of their patches."""
+        small = np.flatnonzero(self.children == 0)
+        return small[np.argsort(self.first[small], kind="stable")]
 
 
 def hierarchy_of(center: NDArray[np.floating], triangles: Integers, kind: Integers) -> Hierarchy:

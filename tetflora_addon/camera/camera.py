@@ -124,13 +124,9 @@ class Camera:
             return self._beside_panorama(np.stack([x, y, depth], axis=-1))
         if self.kind == "ORTHO":
             return np.max([x - right, left - x, y - top, bottom - y], axis=0)
-        walls = [
-            (x - right * depth, right),
-            (left * depth - x, left),
-            (y - top * depth, top),
-            (bottom * depth - y, bottom),
-        ]
-        return np.max([distance / np.hypot(1.0, slope) for distance, slope in walls], axis=0)
+        beyond = x - right * depth, left * depth - x, y - top * depth, bottom * depth - y
+        slopes = np.hypot(1.0, (right, left, top, bottom))
+        return np.max([distance / slope for distance, slope in zip(beyond, slopes, strict=True)], axis=0)
 
     def widened(self, margin: float, margin_up: float | None = None) -> Self:
         """The same camera with more around its image.

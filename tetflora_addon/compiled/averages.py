@@ -129,11 +129,8 @@ def own_leaf_integrals(
     young = q**YOUTH
     area = ((1 + k[:, None] * o) * (1 + (size_young - 1)[:, None] * young)) ** 2
     alike = size_young == 1
-    return (
-        np.where(alike, first, _integral(area)),
-        np.where(alike, second, _integral(area * o)),
-        _integral(area * young),
-    )
+    first, second = np.where(alike, first, _integral(area)), np.where(alike, second, _integral(area * o))
+    return first, second, _integral(area * young)
 
 
 def _integral(values: Floats) -> Floats:
@@ -179,7 +176,7 @@ def average(rows: Table, leaf: RowLeaves) -> Averages:
         if rows["drawn"][i]:
             length[i], radius[i] = rows["size"][i, :2]
         for sort in np.flatnonzero(rows["next"][i] >= 0):
-            sums[i, sort] = one = children_sums(exact, i, int(sort))
+            sums[i, sort] = one = _children_sums(exact, i, int(sort))
             j = rows["next"][i, sort]
             if sort == SPUR:
                 length[j], radius[j] = rows["length"][j, 0], rows["length"][j, 0] * rows["thickness"][j, 0]
@@ -240,12 +237,12 @@ class _Sums:
     radius: float
 
 
-def children_sums(rows: Table, i: int, sort: int) -> _Sums:
+def _children_sums(rows: Table, i: int, sort: int) -> _Sums:
     """Sums over the children of a sort of a mean branch of row ``i``."""
-    row, child = rows[i], rows[rows["next"][i, sort]]
-    number, thickness = float(row["count"][sort, 0]), child["thickness"][0]
     if sort == FORK:
         return _fork_sums(rows, i)
+    row, child = rows[i], rows[rows["next"][i, sort]]
+    number, thickness = float(row["count"][sort, 0]), child["thickness"][0]
     start, (low, high) = row["start"][sort, 0], row["fraction"][sort]
     end = row["start"][sort, 1] if sort == DEAD else 1.0
     t, fraction = start + (end - start) * EVEN, low + (high - low) * EVEN
@@ -256,7 +253,7 @@ def children_sums(rows: Table, i: int, sort: int) -> _Sums:
         mean, variation = child["length"]
         vigor, size, radius = np.ones_like(t), np.full(t.shape, (mean**2 + variation**2 / 3) * thickness), thickness
     else:
-        vigor, thick, size = side_branches(rows, i, sort, t, fraction, fading)
+        vigor, thick, size = _side_branches(rows, i, sort, t, fraction, fading)
         radius = float((weight * thick).mean() * thickness)
     full = weight * fullness_of(rows, np.full(t.shape, row["next"][sort]), vigor)
     nodes = number * full.mean() * np.eye(3)
@@ -268,7 +265,7 @@ def children_sums(rows: Table, i: int, sort: int) -> _Sums:
     return _Sums(number, *means, nodes, length, radius)
 
 
-def side_branches(
+def _side_branches(
     rows: Table, i: int, sort: int, t: NDArray, fraction: NDArray, fading: NDArray | float
 ) -> tuple[Floats, Floats, Floats]:
     """Laterals or dead branches (k,) of a row: vigors, what radii are in proportion to, and lengths × radii.
@@ -288,16 +285,13 @@ def _fork_sums(rows: Table, i: int) -> _Sums:
     forks, power = Range(*row["count"][FORK]), 1 - 1 / row["fork_power"]
     summed, number = expected_forks(forks, power), expected_forks(forks)
     tip = profile(rows, np.array([i]), np.zeros(1, np.uint64), np.ones(1))[0]
-    length = float(child["length"][0])
+    length, radius = float(child["length"][0]), float(tip * number ** (-1 / row["fork_power"]))
     wood = float(summed * tip * length)
-    return _Sums(
-        number, number, wood, wood, number * np.eye(3), length, float(tip * number ** (-1 / row["fork_power"]))
-    )
+    return _Sums(number, number, wood, wood, number * np.eye(3), length, radius)
 
 
 _BASES = np.linspace(0.0, MOST[BASE], 39)
-_ABSCISSAS = np.polynomial.legendre.leggauss(5)[0]
-_MEANS = np.polynomial.legendre.leggauss(5)[1] / 2
+_ABSCISSAS, _MEANS = np.polynomial.legendre.leggauss(5) / np.array([[1], [2]])
 KINDS = len(LEAF_KINDS)
 #: Columns of totals: area and faces of leaves of each kind, faces and surface of branches, and of short shoots alone.
 _AREA, _LEAF_FACES, _LEAVES = slice(KINDS), slice(KINDS, 2 * KINDS), slice(2 * KINDS)
@@ -347,11 +341,10 @@ class ShapedTotals:
             for sort in np.flatnonzero(rows["next"][i] >= 0):
                 j = rows["next"][i, sort]
                 leaves = all_leaves[j]
-                fixed_faces, full_faces, fixed_wood, full_wood, spurs = (
-                    getattr(totals, name)[j].sum() for name in _OF_WOOD
-                )
+                of_wood = (getattr(totals, name)[j].sum() for name in _OF_WOOD)
+                fixed_faces, full_faces, fixed_wood, full_wood, spurs = of_wood
                 if sort in (FORK, SPUR):
-                    one = children_sums(exact, i, int(sort))
+                    one = _children_sums(exact, i, int(sort))
                 if sort == FORK:
                     for whole, its in ((own, power[j]), (on_limbs, borne[j])):
                         stem = its * one.number
@@ -439,7 +432,7 @@ def _limbs(rows: Table, i: int, sort: int, base: float) -> tuple[float, ...]:
         t, fraction = start + (1 - start) * EVEN, among[0] + (among[1] - among[0]) * EVEN
     if sort == LATERAL:
         number *= float(crown_effects.limb_count_factors(rows, at, base)[0])
-    vigor, _, size = side_branches(rows, i, sort, t, fraction, fading)
+    vigor, _, size = _side_branches(rows, i, sort, t, fraction, fading)
     # Numbers of a branch on which nothing follows the length: all but those of new branches.
     plain = rows[[row["next"][sort]]].copy()
     plain["count_by_length"] = 0

@@ -44,11 +44,9 @@ def _joint_turns(row: Table) -> Floats:
     return (np.hypot(back + variation, variation) + pulled + widest_sway(row)[..., None]) / row["segments"][..., None]
 
 
-def ring_stretch(rows: Table) -> Floats:
+def _ring_stretch(rows: Table) -> Floats:
     """Greatest distance (r,) of a tube's vertices from its axis at joints, in radii.
 
-    Notes
-    -----
     A ring at a joint lies along the means of both segments' axes, made unit vectors. These need not be at right angles:
     between frames that a rotation by c separates, the cosine of their angle is at most (1 - cos c) / (3 + cos c),
     where the rotation's axis lies half way between them. A circle becomes an ellipse with the half axis √(1 + cosine).
@@ -59,7 +57,7 @@ def ring_stretch(rows: Table) -> Floats:
 
 def widest_radii(rows: Table) -> Floats:
     """Greatest distance (r,) of the wood of sub-plants from their axes, in radii of the base; without short shoots."""
-    out = np.maximum(1 + rows["flare"], np.where(rows["drawn"], np.sqrt(2.0), ring_stretch(rows)))
+    out = np.maximum(1 + rows["flare"], np.where(rows["drawn"], np.sqrt(2.0), _ring_stretch(rows)))
     for index in range(len(rows) - 1, -1, -1):
         for sort in (LATERAL, FORK, DEAD):
             child = rows["next"][index, sort]
@@ -176,12 +174,11 @@ def _unit_bound(rows: Table, index: int, bounds: Floats, raised: bool) -> Floats
         # Of branches whose bare part is longer, earlier children are at the same place.
         later = np.clip((latest - start) / np.maximum(end - start, 1e-9), 0.0, 0.99)
         earlier = np.maximum((fraction - later) / (1 - later), 0.0)
-        first_fraction, last_fraction = (
-            row["fraction"][sort, 0] + np.ptp(row["fraction"][sort]) * one for one in (earlier[:-1], fraction[1:])
-        )
+        among, width = row["fraction"][sort], np.ptp(row["fraction"][sort])
+        first_fraction, last_fraction = (among[0] + width * one for one in (earlier[:-1], fraction[1:]))
         anywhere = raised or row["growing"][sort, NOW] > 0
         if anywhere:
-            among = (0.0, 1.0) if raised else row["fraction"][sort]
+            among = (0.0, 1.0) if raised else among
             first_fraction, last_fraction = np.tile(np.reshape(among, (2, 1)), _SLABS)
         r, lo, hi = (np.interp(t, knot_t, v) for v in (radius, low, high))
         first = np.minimum((t[:-1] * row["segments"]).astype(int), len(turn) - 1)

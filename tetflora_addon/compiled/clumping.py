@@ -97,23 +97,10 @@ def cell_numbers(points: Sequence[Floats], shape: Integers) -> Integers:
     return ((cube[0] * shape[1] + cube[1]) * shape[2] + cube[2]) * 6 + kind
 
 
-def path_lengths(origin: Floats, direction: Floats, shape: Integers) -> tuple[Integers, Integers, Floats]:
-    """Ways of parallel rays through the tetrahedra of a lattice.
+def _path_lengths(origin: Floats, direction: Floats, shape: Integers) -> tuple[Integers, Integers, Floats]:
+    """Ways of parallel rays from origins (n, 3) through the tetrahedra of a lattice of so many cubes along each axis.
 
-    Parameters
-    ----------
-    origin : (n, 3) float64
-        In units of the lattice's cubes.
-    direction : (3,) float64
-        Unit vector.
-    shape : (3,) int64
-        Cubes along each axis.
-
-    Returns
-    -------
-    ray, cell : (m,) int64
-    length : (m,) float64
-        In the same units.
+    Ray, cell and length (m,) of each part; lengths and origins are in cubes.
     """
     steep = np.where(np.abs(direction) < 1e-9, 1e-9, direction)
     ends = np.sort(np.stack([-origin / steep, (shape - origin) / steep]), axis=0)
@@ -140,7 +127,6 @@ def path_lengths(origin: Floats, direction: Floats, shape: Integers) -> tuple[In
     return inside[ray], cell_numbers(points, shape), length
 
 
-_SKY = np.array([0.0, 0.0, 1.0])
 #: λ and 1 / λ, see `clumping`, are taken to be within e to this power.
 WIDEST = 1.5
 
@@ -182,9 +168,8 @@ class LeafOutlines:
     def outlines(self, near: Integers, u: NDArray, v: NDArray) -> tuple[NDArray, NDArray, NDArray]:
         """Corners (c, 2) of the faces of some, seen along the third of three axes, first corners and numbers (f,)."""
         model, base, frame, size = self.model, self.base[near], self.frame[near], self.size[near]
-        flat = [
-            (base @ axis)[:, None] + size[:, None] * (_inwards(frame, axis).T @ model.positions.T) for axis in (u, v)
-        ]
+        local = (_inwards(frame, axis).T @ model.positions.T for axis in (u, v))
+        flat = ((base @ axis)[:, None] + size[:, None] * own for axis, own in zip((u, v), local, strict=True))
         corners = np.stack([one[:, model.corner_verts].ravel() for one in flat], axis=1)
         first = np.arange(len(near))[:, None] * len(model.corner_verts) + model.face_offsets[:-1]
         return corners, first.ravel(), np.tile(np.diff(model.face_offsets), len(near))
@@ -300,7 +285,7 @@ def _leaves(rows: Table, forms: Forms, bodies: Branches, lines: Axes) -> Iterato
         key = leaf_keys(branches, owner, index)
         t = leaf_places(rows, branches, owner, index, counts[some], key)
         leaves = place_leaves(rows, branches, own, owner, index, key, t)
-        frame = settled(rows, branches.row[:1], leaves.frame, leaves.light, _SKY)
+        frame = settled(rows, branches.row[:1], leaves.frame, leaves.light, leaves.sky)
         models = forms[int(rows["leaf_kind"][row])]
         form = leaf_forms(len(models), key)
         for k, model in enumerate(models):
@@ -452,7 +437,7 @@ def _rays(
             density = np.bincount(within * groups + things.group, shown, count * groups).reshape(-1, groups) / h**3
             dense = np.bincount(within, shown * things.dense, count) / h**3
             some = np.sort(pick[: max(int(segments / (3.5 * extent / side + 1)), 100)])
-            ray, cell, length = path_lengths((origin[some] - corner) / side, direction, shape)
+            ray, cell, length = _path_lengths((origin[some] - corner) / side, direction, shape)
             at = np.minimum(np.searchsorted(cells, cell), count - 1)
             full = np.flatnonzero(cells[at] == cell)
             ray, at = ray[full], at[full]

@@ -159,10 +159,9 @@ def sized(
                 kinds.append(str(Kind.read(kind).aged(age, dead, bool(crowded))))
             if left is not None:
                 left[own] = 0.0
-    plain = (crown == PLAIN).all()
-    return replace(
-        seeds, identifiers=tuple(kinds), species=number, scale=scale, crown=None if plain else crown
-    ), None if left is None or not left.any() else left
+    crown = None if (crown == PLAIN).all() else crown
+    seeds = replace(seeds, identifiers=tuple(kinds), species=number, scale=scale, crown=crown)
+    return seeds, None if left is None or not left.any() else left
 
 
 def fits_of(seeds: Seeds, sizes: Sizes, find: Callable[[str], Species]) -> Floats:
@@ -255,9 +254,8 @@ def _cohort_ages(species: Species, lives: Lives, number: int, full: float) -> Fl
     lengths = np.diff(np.append(begins, len(own)))
     spans = int((year.max() - year.min()) / _STRETCH) + 1
     cell = np.repeat(cohort, lengths) * spans + ((year - year.min()) / _STRETCH).astype(np.int64)
-    weight, at, log_age = (
-        np.bincount(cell, values, len(main) * spans).reshape(-1, spans) for values in (None, year, np.log(age))
-    )
+    sums = (np.bincount(cell, values, len(main) * spans) for values in (None, year, np.log(age)))
+    weight, at, log_age = (values.reshape(-1, spans) for values in sums)
     present = np.ones(len(main))
     for n in range(len(main)):
         some = weight[n] > 0
@@ -319,12 +317,8 @@ class Measure:
         scale = np.where(known, sizes.height * sizes.fit[:, 0] / (self.height * chance), 1.0)
         width = sizes.width * sizes.fit[:, 1] / (self.width * chance * scale)
         wide = known & (sizes.width > 0.0)
-        forms = crown_shapes(
-            len(seeds),
-            np.where(wide, width, 1.0),
-            np.where(known, sizes.base / np.maximum(sizes.height, 1e-9), 0.0),
-            *np.where(known, sizes.offset.T, 0.0),
-        )
+        base = np.where(known, sizes.base / np.maximum(sizes.height, 1e-9), 0.0)
+        forms = crown_shapes(len(seeds), np.where(wide, width, 1.0), base, *np.where(known, sizes.offset.T, 0.0))
         has = (sizes.diameter > 0.0) & (sizes.height > _TALL)
         if has.any():
             shaped = trunks(self.flora.rows, replace(one, scale=scale, crown=forms))

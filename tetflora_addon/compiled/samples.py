@@ -272,7 +272,7 @@ class _Walk:
             pick = systematic(area, group, place, numbers[:1])
         picked, base = points.take(own[pick]), base.take(under[pick])
         on = picked.line[:, self.slot] - self.start
-        limbs = limbs_of(self.rows, self.first, i, on, self.branches, picked.row, base)
+        limbs = _limbs_of(self.rows, self.first, i, on, self.branches, picked.row, base)
         return replace(self._local(picked, base, i), limbs=limbs), first, numbers
 
     def _local(self, points: _Points, base: Branches, i: int) -> _Points:
@@ -374,26 +374,15 @@ class Shares:
         return cls(kinds / np.maximum(kinds.sum(axis=1, keepdims=True), 1), follows)
 
 
-def limbs_of(
+def _limbs_of(
     rows: Table, first: int, i: int, number: Integers, branches: Sequence[Branches], row: Integers, base: Branches
 ) -> Limbs:
-    """The limbs of samples of one row.
+    """The limbs of samples (k,) of row ``i`` of the species that begins at row ``first``.
 
-    Parameters
-    ----------
-    first, i : int
-        First row of the species, and the row that is sampled, counted from there.
-    number : (k, s) int
-        Numbers of the branches that samples are on, of each row of the species that these may be of.
-    branches : sequence of Branches
-        By row of the species.
-    row : (k,) int
-        Row that describes each sample.
-    base : Branches of k
-        Branches of the row that is sampled on which samples are.
+    ``number`` (k, s) are those of the ``branches`` of each row of the species that samples are on, ``row`` (k,)
+    describes each sample, and ``base`` are the branches (k) of row ``i`` that they are on.
     """
-    species, k = rows[first : first + number.shape[1]], len(row)
-    out = Limbs(np.zeros((k, 3), np.float32), np.zeros(k, np.int8), np.zeros(k, np.float32))
+    species, out = rows[first : first + number.shape[1]], Limbs.zeros(len(row))
     trunks = np.flatnonzero((species["order"] == 0) & ~species["drawn"] & ~species["phantom"])
     if i not in trunks:
         return out

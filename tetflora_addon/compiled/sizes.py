@@ -300,12 +300,8 @@ def _sizes(flora: Flora, seeds: Seeds) -> "tuple[Floats, Floats, OuterLimbs | No
     """Heights and crown widths (n,), (n,) of plants of one species, and what reaches farthest, if they have limbs."""
     plants, beyond = trunks(flora.rows, seeds), _beyond(flora, int(seeds.species[0]))
     if beyond.whole[0] > 0:
-        length = (
-            plants.length
-            if plants.crown is None
-            else plants.length / length_factors(flora.rows, plants.row, plants.crown)
-        )
-        return beyond.whole[0] * length, beyond.whole[1] * length, None
+        shaped = 1.0 if plants.crown is None else length_factors(flora.rows, plants.row, plants.crown)
+        return beyond.whole[0] * (plants.length / shaped), beyond.whole[1] * (plants.length / shaped), None
     found = outermost(flora.rows, plants, beyond)
     return *found.sizes(), found
 

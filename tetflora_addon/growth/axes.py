@@ -111,10 +111,9 @@ def _axes(rows: Table, branches: Branches, ahead: float = 0.0) -> Axes:
     for s in range(most):
         if s:
             # The joint in the middle of an even number of segments belongs to the outer half.
-            back = np.where(2 * s < segments, bend[:, 0], outer_bend) + bend[:, 1] * signed(
-                branches.key, Draw.BEND + 2 * s
-            )
-            frame = _bent(frame, -back, bend[:, 1] * signed(branches.key, Draw.BEND + 2 * s + 1))
+            back, aside = (bend[:, 1] * signed(branches.key, Draw.BEND + 2 * s + turn) for turn in (0, 1))
+            back = np.where(2 * s < segments, bend[:, 0], outer_bend) + back
+            frame = _bent(frame, -back, aside)
             if len(attracted) == n:
                 frame = _pulled(frame, pull, branches.sky)
             elif len(attracted):
@@ -131,9 +130,8 @@ def _axes(rows: Table, branches: Branches, ahead: float = 0.0) -> Axes:
         own = branches.take(by_hand)
         knots[by_hand], frames[by_hand], turn = _drawn_axes(rows, own, most)
         if windy:
-            knots[by_hand], frames[by_hand], skies[by_hand] = _leaned(
-                rows, own, turn, knots[by_hand], frames[by_hand], ahead
-            )
+            leaned_lines = _leaned(rows, own, turn, knots[by_hand], frames[by_hand], ahead)
+            knots[by_hand], frames[by_hand], skies[by_hand] = leaned_lines
     return Axes(knots, frames, segments, skies)
 
 
@@ -216,9 +214,8 @@ def profile(rows: Table, row: NDArray, key: Keys, t: Floats, summed: bool = Fals
     if len(flared):
         end = np.minimum(t[flared], FLARE_END) if summed else t[flared]
         fall = np.exp(-_FALL * end)
-        out[flared] += rows["flare"][row[flared]] * (
-            (1 - fall) / _FALL - 0.01 * end if summed else np.maximum(fall - 0.01, 0)
-        )
+        more = (1 - fall) / _FALL - 0.01 * end if summed else np.maximum(fall - 0.01, 0)
+        out[flared] += rows["flare"][row[flared]] * more
     return out
 
 

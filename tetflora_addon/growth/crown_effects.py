@@ -110,9 +110,8 @@ def count_factors(rows: Table, row: Integers, base: ArrayLike, sort: int, start:
 
 def limb_count_factors(rows: Table, row: Integers, base: ArrayLike) -> Floats:
     """How many limbs (n,) the stems beyond forks have because they are shorter; 1 for all others."""
-    return np.where(
-        rows["continues"][row] & (rows["order"][row] == 0), trunk_ratios(base, first_forks(rows, row))[1], 1.0
-    )
+    stem = rows["continues"][row] & (rows["order"][row] == 0)
+    return np.where(stem, trunk_ratios(base, first_forks(rows, row))[1], 1.0)
 
 
 def child_factors(rows: Table, parent: Branches, azimuth: Floats, sort: int) -> tuple[Floats, Floats]:

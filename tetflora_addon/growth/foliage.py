@@ -105,16 +105,10 @@ def leaf_sites(
     return position, frame, at
 
 
-def inclined(frame: Floats32, kind: Integers, key: Keys) -> Floats32:
+def _inclined(frame: Floats32, kind: Integers, key: Keys) -> Floats32:
     """Frames (m, 3, 3) of leaves that stand by a distribution, all around their branch and turned in their own plane.
 
-    Parameters
-    ----------
-    frame : (m, 3, 3) float32
-        Of the branch where each leaf is.
-    kind : (m,) or (1,) int
-        Index into `LEAF_INCLINATIONS`.
-    key : (m,) uint64
+    ``frame`` (m, 3, 3) is that of the branch there, ``kind`` (m,) or (1,) an index into `LEAF_INCLINATIONS`.
     """
     number = uniform(key, Draw.LEAF_INCLINATION)
     angle = np.arccos(1.0 - number)  # of a sphere
@@ -243,7 +237,7 @@ def _rows_of(branches: Branches, owner: Integers) -> Integers32:
 def place_leaves(
     rows: Table, branches: Branches, lines: Axes, owner: Integers, index: Integers, key: Keys, t: Floats
 ) -> Leaves:
-    """Leaves at given fractions of their branches; call `face_light` to turn them to the sky.
+    """Leaves at given fractions of their branches; call `settled` to turn them to the sky.
 
     Parameters
     ----------
@@ -295,7 +289,7 @@ def leaf_frames(
     """
     kind = rows["inclination"][row]
     if kind.all():
-        return inclined(frame, kind, key)
+        return _inclined(frame, kind, key)
     step, jitter = rows["leaf_azimuth"][row].T
     whorl = rows["leaf_whorl"][row]
     node, within = (index // whorl, (index % whorl) / whorl) if (whorl > 1).any() else (index, 0.0)
@@ -307,7 +301,7 @@ def leaf_frames(
     turns -= np.rint(turns)  # whole turns would cost single precision its last digits
     azimuth = (turns * (2 * np.pi)).astype(np.float32)
     out = _leaf_frames(frame, azimuth, ranged(rows, "leaf_angle", row, key, Draw.ANGLE).astype(np.float32))
-    return np.where(kind[:, None, None] > 0, inclined(frame, kind, key), out) if kind.any() else out
+    return np.where(kind[:, None, None] > 0, _inclined(frame, kind, key), out) if kind.any() else out
 
 
 def _leaf_frames(frame: Floats32, azimuth: Floats32, angle: Floats32) -> Floats32:
@@ -330,23 +324,8 @@ def _leaf_frames(frame: Floats32, azimuth: Floats32, angle: Floats32) -> Floats3
     return out.transpose(2, 0, 1)
 
 
-def face_light(frame: NDArray[np.floating], light: Floats, sky: Floats) -> NDArray:
-    """Turn leaves to the sky, as far as their orders ask for.
-
-    Parameters
-    ----------
-    frame : (n, 3, 3) float64 or float32
-        Leaf frames (across, along, upper side).
-    light : (n,) or (1,) float64
-        0 leaves them as they are, 1 makes them level.
-    sky : (3,) or (n, 3) float64
-        Unit vector toward the sky.
-
-    Returns
-    -------
-    (n, 3, 3), type of frame
-        Right-handed frames; the upper side is turned, the midrib follows by the least turn.
-    """
+def _face_light(frame: NDArray[np.floating], light: Floats, sky: Floats) -> NDArray:
+    """Leaf frames (n, 3, 3) whose upper sides are turned to the sky; midribs follow by the least turn. As `settled`."""
     along, up, light, sky = _by_component(frame, light, sky)
     normal = _toward(up, light, sky, 1e-9)
     along_out = along - _inner(along, normal) * normal
@@ -367,26 +346,37 @@ def settled(rows: Table, row: Integers, frame: NDArray[np.floating], light: Floa
     Parameters
     ----------
     row : (n,) or (1,) int
-    frame, light, sky
-        As for `face_light`.
+    frame : (n, 3, 3) float64 or float32
+        Across, along, upper side.
+    light : (n,) or (1,) float64
+        0 leaves them as they are, 1 makes them level.
+    sky : (3,) or (n, 3) float64
+        Unit vector toward the sky.
+
+    Returns
+    -------
+    (n, 3, 3), type of frame
+        Right-handed.
     """
-    frame = face_light(frame, light, sky)
+    frame = _face_light(frame, light, sky)
     droop = rows["leaf_droop"][row]
-    return hanging(frame, droop, sky) if droop.any() else frame
+    return _hanging(frame, droop, sky) if droop.any() else frame
 
 
-def in_wind(rows: Table, branches: Branches, leaves: Leaves, frame: Floats32, ahead: float = 0.0) -> Floats32:
-    """`settled` frames (m, 3, 3) of leaves (m) of branches as the wind turns them; as they are where there is none.
+def settled_in_wind(rows: Table, branches: Branches, leaves: Leaves, ahead: float = 0.0) -> Floats32:
+    """`settled` frames (m, 3, 3) of leaves (m) of branches, as the wind turns them if there is any.
 
     So many seconds after the moment of the rows; the branches are where they are then.
     """
+    row = _rows_of(branches, leaves.branch)
+    frame = settled(rows, row, leaves.frame, leaves.light, leaves.sky)
     if not is_windy(rows):
         return frame
     gust = np.take(gusts(rows, branches.position, ahead), leaves.branch)
-    return fluttered(rows, _rows_of(branches, leaves.branch), frame, leaves.key, gust, ahead)
+    return fluttered(rows, row, frame, leaves.key, gust, ahead)
 
 
-def hanging(frame: NDArray[np.floating], droop: Floats, sky: Floats) -> NDArray:
+def _hanging(frame: NDArray[np.floating], droop: Floats, sky: Floats) -> NDArray:
     """Let leaves hang: the midrib turns down as far as ``droop`` (n,) or (1,), the blade follows it."""
     along, up, droop, sky = _by_component(frame, droop, sky)
     along_out = _toward(along, droop, -sky, 1e-6)

@@ -13,27 +13,12 @@ from numpy.typing import NDArray
 
 from ..arrays import Arrays, Floats, Integers, Integers32, Keys, Table, by_component, columns, dot, spread
 from ..species.members import dead_vigor
-from ..species.species import faded
+from ..species.species import NodeLaw, faded
 from . import crown_effects
+from . import rows as table
 from .axes import Axes, axes, profile
 from .hashing import Draw, child_key, key_of_seed, signed, uniform
-from .rows import (
-    BOX,
-    DEAD,
-    FADES,
-    FLARE_RINGS,
-    FORK,
-    LATERAL,
-    NOW,
-    SPUR,
-    Grown,
-    child_number,
-    fullness_of,
-    grown_nodes,
-    lengths,
-    ranged,
-    varied,
-)
+from .rows import DEAD, FORK, LATERAL, SPUR, Grown, child_number, fullness_of, lengths, ranged, varied
 from .seasons import plant_years
 from .seeds import BASE, LEAVES, Branches, Pose, Seeds
 from .wind import axis_and_angle, is_windy, moment, turned_by, turned_vectors
@@ -81,7 +66,7 @@ def trunks(rows: Table, seeds: Seeds) -> Branches:
     """Trunks of plants (order 0)."""
     row, key, length = trunk_lengths(rows, seeds)
     radius = length * ranged(rows, "thickness", row, key, Draw.THICKNESS)
-    straight = rows["phantom"][row] | (rows["envelope"][row] == BOX)
+    straight = rows["phantom"][row] | (rows["envelope"][row] == table.BOX)
     roll = np.where(straight, 0.0, 2 * np.pi * uniform(key, Draw.ROLL))
     frame = turned(seeds.frame, roll, ranged(rows, "angle", row, key, Draw.ANGLE))
     plant = np.arange(len(seeds), dtype=np.int32)
@@ -166,24 +151,46 @@ def branch_counts(rows: Table, branches: Branches, sort: int = LATERAL) -> Integ
 
 def living_nodes(rows: Table, branches: Branches, sort: int) -> Grown | None:
     """Living nodes of branches that are not full-grown; None where all are."""
-    row, key = branches.row, branches.key
-    if sort == FORK or not rows["growing"][row, sort, NOW].any():
+    row, key, path = branches.row, branches.key, int(_PATHS[sort])
+    if sort == FORK or not rows["growing"][row, sort, table.NOW].any():
         return None
+    own = rows["growing"][row, sort]
+    on = own[:, table.NOW] > 0
+    now, power = (np.where(on, own[:, column], 1.0) for column in (table.NOW, table.POWER))
     whorl = np.maximum(rows["whorl"][rows["next"][row, sort]], 1)
     wanted = varied(rows["count"][row, sort], key, _COUNT[sort]) * fullness(rows, branches, wood=True) / whorl
-    start, draw, ends = rows["start"][row, sort], np.zeros(len(row)), None
-    if sort != DEAD:
-        draw = signed(key, _START[sort])
-    start = start[:, 0] if sort == DEAD else start[:, 0] + start[:, 1] * draw
+    draw = np.zeros(len(row)) if sort == DEAD else signed(key, _START[sort])
+    mean, variation = rows["start"][row, sort].T
+    start = described = mean + variation * draw
+    last = own[:, table.UNTIL]
     if crown_effects.are_shaped(rows, branches):
-        base, none = branches.crown[:, BASE], np.zeros(len(row))
+        base = branches.crown[:, BASE]
         bare = crown_effects.bare_part(rows, row, base)
         if sort == LATERAL:
-            ends, wanted = (bare, none), wanted * crown_effects.limb_count_factors(rows, row, base)
+            start, wanted = np.maximum(start, bare), wanted * crown_effects.limb_count_factors(rows, row, base)
         elif sort == DEAD:
-            ends = none, bare
-    chance = uniform(key, _ROUND[sort])
-    return grown_nodes(rows, branches, sort, int(_PATHS[sort]), wanted, start, draw, chance, ends)
+            last = np.where(last > start, np.maximum(last, bare), last)
+    begin = table.varied_begin(own[:, table.BEGIN], own[:, table.VARIES], draw)
+    whole = wanted * own[:, table.WHOLE]
+    law = NodeLaw(begin, np.maximum(own[:, table.END], begin), power, whole, wanted * own[:, table.BELOW])
+    # Nodes of the full-grown branch are rounded.
+    settled, chance = rows["settled"][row], uniform(key, _ROUND[sort])
+    rounded = (1 - settled) * whole + settled * np.floor(whole + chance)
+    density = np.where(whole > 0, rounded / np.maximum(whole, 1e-12), 1.0), own[:, table.EXTRA]
+    ends = np.stack([law.number_at(place * now) for place in (start, own[:, table.FRESH], last)])
+    ends = np.maximum(ends, ends[0])
+
+    def passed(place: Floats, begin: int) -> Integers:
+        node = np.floor(place)
+        first = child_key(key, child_number((node * whorl).astype(np.int64), path + begin))
+        within = 0.5 + 0.5 * signed(first, Draw.PLACE)  # where in their node children sit, 0 to 1
+        return node.astype(np.int64) + (within < place - node)
+
+    stay = [passed(np.where(place > 0, place * density[0], place), 0) for place in (ends[0], ends[2])]
+    extra = [passed(place * density[1], table.EXTRA_PATH) for place in ends[1:]]
+    first, last = np.stack([stay, extra], axis=1)
+    described = law.number_at(described * now)
+    return Grown(on, first, np.maximum(last - first, 0), now, law, ends, np.stack(density), described)
 
 
 def _started(rows: Table, branches: Branches, sort: int) -> Floats:
@@ -258,7 +265,7 @@ def chosen_children(
         fraction = low + (high - low) * fraction
         if grown is not None:
             first, last = among.T
-            fading = faded(first + (last - first) * own, rows["growing"][parent.row, sort, FADES], extra)
+            fading = faded(first + (last - first) * own, rows["growing"][parent.row, sort, table.FADES], extra)
     position, frame = lines.at(owner, t)
     sky = lines.sky_at(owner, t)
     angle_base, angle_spread = rows["angle"][row].T
@@ -306,10 +313,9 @@ def chosen_children(
     if lines.later is not None:
         again = chosen_children(rows, parents.moved(), lines.later, owner, index, counts, sort)
         later = Pose(again.position, again.frame, again.sky)
-    own = row, parent.plant, key, position, frame, length, radius, parent.scale, vigor, around, sky, later, parent.year
-    return Branches(
-        *own, None if parent.crown is None else crown_effects.handed_on(rows, parent, sort, reach, azimuth, angle)
-    )
+    crown = None if parent.crown is None else crown_effects.handed_on(rows, parent, sort, reach, azimuth, angle)
+    place = position, frame, length, radius, parent.scale, vigor, around, sky, later
+    return Branches(row, parent.plant, key, *place, parent.year, crown)
 
 
 def children(rows: Table, parents: Branches, lines: Axes | None = None) -> tuple[Branches, Integers]:
@@ -348,7 +354,7 @@ class WholeBranches(Arrays):
         t = knot / np.take(self.lines.segments, owner)
         position = self.lines.knot(owner, knot)
         if rings.any():  # the first segment is cut where the flare bends most
-            at = np.array([0.0, *FLARE_RINGS[: int(rings.max())]])
+            at = np.array([0.0, *table.FLARE_RINGS[: int(rings.max())]])
             cut = np.flatnonzero((index <= rings[owner]) & (index > 0) & (rings[owner] > 0))
             t[cut] = at[index[cut]]
             position[cut] = self.lines.at(owner[cut], t[cut])[0]

@@ -26,54 +26,16 @@ _TO_UNIT = 2.0**-53
 class Draw(IntEnum):
     """What a random number is drawn for; one number for each attribute of a branch or leaf."""
 
-    LENGTH = 1
-    THICKNESS = 2
-    ANGLE = 3
-    AZIMUTH = 4
-    ROLL = 5
-    PLACE = 6
-    BRANCHES = 7
-    BRANCHES_ROUND = 8
-    LEAVES = 9
-    LEAVES_ROUND = 10
-    BRANCH_COLOR = 11
-    LEAF_COLOR = 12
-    LEAF_SIZE = 13
-    TAPER = 14
-    BRANCH_START = 15
-    LEAF_START = 16
-    LEAF_LIGHT = 17
-    ATTRACTION = 18
-    FORKS = 19
-    FORKS_ROUND = 20
-    SPURS = 21
-    SPURS_ROUND = 22
-    SPUR_START = 23
-    LEAF_FORM = 24
-    TRANSITION = 25
-    SWAY_ALONG = 26
-    SWAY_ACROSS = 27
-    SWAY_UP = 28
-    LEAF_KITE = 29
-    LEAF_PLANE = 30
-    TWIG_TURN = 31
+    LENGTH, THICKNESS, ANGLE, AZIMUTH, ROLL, PLACE = range(1, 7)
+    BRANCHES, BRANCHES_ROUND, LEAVES, LEAVES_ROUND = range(7, 11)
+    BRANCH_COLOR, LEAF_COLOR, LEAF_SIZE, TAPER, BRANCH_START, LEAF_START, LEAF_LIGHT, ATTRACTION = range(11, 19)
+    FORKS, FORKS_ROUND, SPURS, SPURS_ROUND, SPUR_START = range(19, 24)
+    LEAF_FORM, TRANSITION, SWAY_ALONG, SWAY_ACROSS, SWAY_UP, LEAF_KITE, LEAF_PLANE, TWIG_TURN = range(24, 32)
     BEND = 32  # one for each segment and axis from here on
-    LEAF_LEVEL = 226  # beyond those of all segments
-    LEAF_VARIANT = 227
-    DEAD = 228
-    DEAD_ROUND = 229
-    BUD = 230
-    BROKEN = 231
-    LEAF_INCLINATION = 232
-    LEAF_BEARING = 233
-    LEAF_SIDE = 234
-    LEAF_TWIST = 235
-    ENVELOPE_ACROSS = 236
-    ENVELOPE_AROUND = 237
-    LEAF_YEAR = 238
-    SPRING = 239
-    AUTUMN = 240
-    AUTUMN_HUE = 241
+    LEAF_LEVEL, LEAF_VARIANT = 226, 227  # beyond those of all segments
+    DEAD, DEAD_ROUND, BUD, BROKEN = range(228, 232)
+    LEAF_INCLINATION, LEAF_BEARING, LEAF_SIDE, LEAF_TWIST, ENVELOPE_ACROSS, ENVELOPE_AROUND = range(232, 238)
+    LEAF_YEAR, SPRING, AUTUMN, AUTUMN_HUE = range(238, 242)
 
 
 def mix(z: Keys) -> Keys:

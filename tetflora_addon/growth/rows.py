@@ -45,33 +45,20 @@ from ..species.species import (
     some_nodes,
     whole_cuts,
 )
-from .hashing import Draw, child_key, signed
-from .seeds import Branches
+from .hashing import signed
 
 NOW, BEGIN, END, UNTIL, POWER, WHOLE, BELOW, FRESH, EXTRA, VARIES, FADES = range(11)
 """Columns of ``growing``."""
 _GAUSS, _WEIGHTS = np.polynomial.legendre.leggauss(5) / np.array([[1], [2]])
 
 
-def grow_children(
-    row: np.void, sort: int, nodes: Nodes, start: tuple[float, float], now: float, cuts: Sequence[float], p: int
+def _grow_children(
+    row: np.void, sort: int, nodes: Nodes, start: Range, now: float, cuts: Sequence[float], p: int
 ) -> None:
     """Set what a row knows of its children of one sort: numbers, ends, ``growing``.
 
-    Parameters
-    ----------
-    row : record of `rows.ROW_DTYPE`
-        Its count is that of the whole axis, of which it is one part.
-    nodes : Nodes
-        Of the whole axis.
-    start : pair of float
-        Part of the present axis without children, mean and variation.
-    now : float
-        Length of the axis over the full-grown one.
-    cuts : sequence of float
-        Ends of its parts, as fractions of the full-grown length.
-    p : int
-        Number of the part.
+    Its count and ``nodes`` are those of the whole axis, of which the row is part ``p``: ``cuts`` are the ends of all,
+    as fractions of the full-grown length. ``start`` is the part of the present axis, ``now`` so long, without children.
     """
     number = float(row["count"][sort, 0])
     if number <= 0:
@@ -184,7 +171,7 @@ def fullness_of(rows: Table, row: Integers, vigor: Floats, own: Floats | None = 
 
 #: Where numbers of nodes that live for a while begin, and those below the first are counted back from: no child
 #: index of one is that of another, nor of another sort.
-_EXTRA, _NEGATIVE = 1 << 27, 1 << 28
+EXTRA_PATH, _NEGATIVE = 1 << 27, 1 << 28
 
 
 def child_number(index: Integers, path: int) -> Integers:
@@ -216,7 +203,7 @@ class Grown:
         on, stay = self.on[owner], self.number[0][owner]
         extra = on & (node >= stay)
         node = node + np.where(on, np.where(extra, self.first[1][owner] - stay, self.first[0][owner]), 0)
-        return node * whorl + within, np.where(extra, _EXTRA, 0), extra
+        return node * whorl + within, np.where(extra, EXTRA_PATH, 0), extra
 
     def places(self, owner: Integers, node: Integers, within: Floats, extra: Mask) -> tuple[Floats, Floats, Floats]:
         """Fractions (m,) for nodes (m,) of branches (m,): of the branch, of its children, and of those as described."""
@@ -227,63 +214,6 @@ class Grown:
         high = self.ends[2][owner]
         parts = [(own - low) / np.maximum(high - low, 1e-9) for low in (self.ends[0][owner], self.described[owner])]
         return np.clip(t, 0, 1), np.clip(parts[0], 0, 1), np.clip(parts[1], 0, 1)
-
-
-def grown_nodes(
-    rows: Table,
-    branches: Branches,
-    sort: int,
-    path: int,
-    wanted: Floats,
-    start: Floats,
-    draw: Floats,
-    chance: Floats,
-    shaped: tuple[Floats, Floats] | None = None,
-) -> Grown:
-    """Living nodes of branches for children of one sort.
-
-    Parameters
-    ----------
-    branches : Branches of n
-    sort, path : int
-        Of children, and where their child indices begin.
-    wanted : (n,) float64
-        How many nodes there are to be.
-    start, draw : (n,) float64
-        Bare part of each, and the random numbers between -1 and 1 that it follows.
-    chance : (n,) float64
-        Random numbers by which the nodes of the full-grown branch are rounded.
-    shaped : pair of (n,) float64, optional
-        Where the lowest and the topmost are at least, because of crown shapes.
-    """
-    row, key = branches.row, branches.key
-    own = rows["growing"][row, sort]
-    on = own[:, NOW] > 0
-    now = np.where(on, own[:, NOW], 1.0)
-    begin = varied_begin(own[:, BEGIN], own[:, VARIES], draw)
-    power = np.where(on, own[:, POWER], 1.0)
-    whole = wanted * own[:, WHOLE]
-    law = NodeLaw(begin, np.maximum(own[:, END], begin), power, whole, wanted * own[:, BELOW])
-    settled = rows["settled"][row]
-    rounded = (1 - settled) * whole + settled * np.floor(whole + chance)
-    density = np.stack([np.where(whole > 0, rounded / np.maximum(whole, 1e-12), 1.0), own[:, EXTRA]])
-    last, described = own[:, UNTIL], law.number_at(start * now)
-    if shaped is not None:
-        last = np.where(last > start, np.maximum(last, shaped[1]), last)
-        start = np.maximum(start, shaped[0])
-    ends = np.stack([law.number_at(place * now) for place in (start, own[:, FRESH], last)])
-    ends = np.maximum(ends, ends[0])
-    whorl = np.maximum(rows["whorl"][rows["next"][row, sort]], 1)
-
-    def passed(place: Floats, begin: int) -> Integers:
-        node = np.floor(place)
-        first = child_key(key, child_number((node * whorl).astype(np.int64), path + begin))
-        within = 0.5 + 0.5 * signed(first, Draw.PLACE)  # where in their node children sit, 0 to 1
-        return node.astype(np.int64) + (within < place - node)
-
-    stay = [passed(np.where(place > 0, place * density[0], place), 0) for place in (ends[0], ends[2])]
-    first, last = np.stack([stay, [passed(place * density[1], _EXTRA) for place in ends[1:]]], axis=1)
-    return Grown(on, first, np.maximum(last - first, 0), now, law, ends, density, described)
 
 
 MAX_SEGMENTS = 24
@@ -444,20 +374,18 @@ def _rows_of_species(one: Species, number: int, first: int) -> list[np.void]:
     """Rows of one species; ``first`` is the index of its trunk in the table."""
     if one.exact:
         one = without_variation(one)
-    drawn = None
-    if one.skeleton is not None:
-        drawn = drawn_lines(drawn_branches(one.skeleton))
+    drawn = None if one.skeleton is None else drawn_lines(drawn_branches(one.skeleton))
+    has_spurs = one.spur is not None and any(order.spurs.high > 0 for order in one.orders)
     cuts = [fork_cuts(order) for order in one.orders]
     ahead = 0 if drawn is None else 1 + len(drawn.order)
     begin = first + ahead + np.concatenate([[0], np.cumsum([len(c) - 1 for c in cuts])])
     spur = int(begin[-1])
-    dead = spur + (one.spur is not None and any(order.spurs.high > 0 for order in one.orders))
+    dead = spur + has_spurs
     out = [] if drawn is None else _drawn_rows(one, drawn, number, first, begin, spur)
     for o, order in enumerate(one.orders):
         whole = _row(order, number, o)
         for p, (low, high) in enumerate(zip(cuts[o][:-1], cuts[o][1:], strict=True)):
             row = whole.copy()
-            row["next"] = -1
             if order.branches.high > 0:
                 row["next"][LATERAL] = begin[o + 1]
             if p < len(cuts[o]) - 2:
@@ -479,10 +407,8 @@ def _rows_of_species(one: Species, number: int, first: int) -> list[np.void]:
             out.append(row)
             if row["next"][LATERAL] >= 0 and row["pipe"] > 0:
                 row["pipe_radius"] = _pipe_radius(row, one.orders[o + 1].thickness.high)
-    if any(order.spurs.high > 0 for order in one.orders) and one.spur is not None:
-        row = _row(one.spur, number, SPUR_ORDER)
-        row["next"] = -1
-        out.append(row)
+    if has_spurs:
+        out.append(_row(one.spur, number, SPUR_ORDER))
     if one.dead is not None and drawn is None:
         out += _dead_rows(one.dead, number, first + len(out))
     for row in out:
@@ -495,7 +421,7 @@ def _dead_rows(dead: Dead, species: int, first: int) -> list[np.void]:
     out = []
     for o, order in enumerate(dead.orders):
         row = _row(order, species, DEAD_ORDER + o)
-        row["next"], row["dead"] = -1, True
+        row["dead"] = True
         if o + 1 < len(dead.orders) and order.branches.high > 0:
             row["next"][LATERAL] = first + o + 1
         out.append(row)
@@ -517,7 +443,7 @@ def _drawn_rows(one: Species, drawn: DrawnLines, number: int, first: int, begin:
     for b, o in enumerate(np.minimum(drawn.order, len(one.orders) - 1)):
         order = one.orders[o]
         row = _row(order, number, int(o))
-        row["next"], row["count"][FORK], row["rings"], row["flare"], row["pipe"] = -1, 0, 0, 0, 0
+        row["rings"], row["flare"], row["pipe"] = 0, 0, 0
         if drawn.order[b] == highest and order.branches.high > 0:
             row["next"][LATERAL] = begin[o + 1]
         if order.spurs.high > 0 and one.spur is not None:
@@ -545,7 +471,7 @@ def _row(order: Order, species: int, number: int) -> np.void:
     row["envelope"] = LEAF_ENVELOPES.index(order.leaf_envelope)
     row["envelope_radius"] = order.leaf_envelope_radius if row["envelope"] else 0.0
     row["inclination"] = LEAF_INCLINATIONS.index(order.leaf_inclination)
-    row["species"], row["order"], row["outward"] = species, number, number <= 1
+    row["species"], row["order"], row["outward"], row["next"] = species, number, number <= 1, -1
     row["count"] = order.branches, (0, 0), order.spurs, (0, 0)
     row["start"] = order.branch_start, (0, 0), order.spur_start, (0, 0)
     row["fraction"], row["part"], row["nominal"] = (0, 1), (0, 1), 1
@@ -569,7 +495,7 @@ def _grow(row: np.void, order: Order, p: int, dead: Dead | None) -> None:
     for sort, nodes, number, start in sorts:
         if row["next"][sort] >= 0:
             row["count"][sort] = number
-            grow_children(row, sort, nodes, start, own.now, cuts, p)
+            _grow_children(row, sort, nodes, start, own.now, cuts, p)
             if sort == DEAD:
                 row["start"][DEAD, 1] = max(row["start"][DEAD, 0], row["growing"][DEAD, UNTIL])
 

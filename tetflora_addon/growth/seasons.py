@@ -156,11 +156,7 @@ def _numbers(leaf: LeafYear) -> np.void:
 def plant_years(rows: Table, row: Integers, key: Keys) -> Floats | None:
     """The day that it is for plants (n, 2), and where they stand among autumn colors, 0 to 1; None without seasons.
 
-    Parameters
-    ----------
-    row : (n,) int
-        Of their trunks.
-    key : (n,) uint64
+    ``row`` (n,) are those of their trunks.
     """
     if not is_seasonal(rows):
         return None
@@ -213,14 +209,8 @@ def leaf_stages(rows: Table, row: Integers, key: Keys, day: Floats) -> Stages:
     alive = arrived & hangs
     there = alive | ~follows | (chance < year["turnover"] * year["kept"])
     live = alive & follows
-    return Stages(
-        there,
-        np.where(live, size, 1.0),
-        np.where(live, fresh, 0.0),
-        np.where(live, turned, 0.0),
-        (follows & ~alive).astype(np.float64),
-        tint,
-    )
+    size, fresh, turned = (np.where(live, of, other) for of, other in ((size, 1.0), (fresh, 0.0), (turned, 0.0)))
+    return Stages(there, size, fresh, turned, (follows & ~alive).astype(np.float64), tint)
 
 
 def _springtime(year: np.void | Table, day: Floats, deviation: Floats) -> tuple[Mask, Floats, Floats]:

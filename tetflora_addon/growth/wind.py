@@ -17,7 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import Floats, Floats32, Integers, Keys, Table, cross, dot
+from ..arrays import Floats, Floats32, Integers, Keys, Table, columns, cross, dot
 from ..errors import TetFloraError
 from ..parameters import FACTOR, setting, within
 from .hashing import Draw, uniform
@@ -59,9 +59,7 @@ AIR_DTYPE = np.dtype(
 things move (0: not needed), meters a second, fraction by which gusts are stronger or
 weaker, as rows where it blows to, across that, and up, and where in the world positions are counted from, meters."""
 
-WIND_COLUMNS = [("lean", np.float64), ("pace", np.float64), ("flutter", np.float64), ("flutter_rate", np.float64)] + [
-    ("air", AIR_DTYPE)
-]
+WIND_COLUMNS = [*((name, np.float64) for name in ("lean", "pace", "flutter", "flutter_rate")), ("air", AIR_DTYPE)]
 """``lean`` is the mean turn of a branch's tip, radians (of plants drawn by hand: for each meter above ground at scale
 1); ``pace`` the natural frequency times the length, hertz meters (likewise: hertz at scale 1); ``flutter`` the largest
 sine of leaves' turns in a wind without gusts, ``flutter_rate`` their frequency, hertz."""
@@ -129,9 +127,8 @@ def windy_rows(rows: Table, length: Floats, radius: Floats, wind: Wind) -> Table
         for name in ("lean", "pace"):
             out[name][drawn] = out[name][i] / rows["length"][i, 0]
     out["flutter"] = min(_FLUTTER * wind.strength, _FLUTTER_MOST)
-    out["flutter_rate"] = _FLUTTER_RATE * np.sqrt(
-        _FLUTTER_SIZE / np.clip(rows["leaf_size"][:, 0], _FLUTTER_SIZE / 4, _FLUTTER_SIZE * 4)
-    )
+    size = np.clip(rows["leaf_size"][:, 0], _FLUTTER_SIZE / 4, _FLUTTER_SIZE * 4)
+    out["flutter_rate"] = _FLUTTER_RATE * np.sqrt(_FLUTTER_SIZE / size)
     c, s = np.cos(wind.direction), np.sin(wind.direction)
     air = out["air"]
     air["time"], air["loop"], air["speed"], air["gusts"] = wind.time, wind.loop, max(wind.speed, 0.1), wind.gusts
@@ -214,7 +211,7 @@ def turned_by(frame: Floats, axis: Floats, angle: Floats) -> Floats:
     """Frames (n, 3, 3) turned about unit vectors (n, 3) by angles (n,) (Rodrigues)."""
     cos, sin = np.cos(angle)[:, None], np.sin(angle)[:, None]
     x, z = (_rotated(frame[:, :, column], axis, cos, sin) for column in (0, 2))
-    return np.stack([x.T, cross(z, x).T, z.T], axis=1).transpose(2, 0, 1)
+    return columns(x, cross(z, x), z)
 
 
 def turned_vectors(vector: Floats, axis: Floats, angle: Floats) -> Floats:

@@ -352,14 +352,9 @@ def _divided(
     (ta, tb, tc), (tab, tbc, tca) = (texture[:, i].transpose(1, 0, 2) for i in range(2))
     faces = [(a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca)]
     textures = [(ta, tab, tca), (tab, tb, tbc), (tca, tbc, tc), (tab, tbc, tca)]
-    return (
-        np.concatenate([points, new]),
-        np.concatenate([np.stack(face, axis=1) for face in faces]),
-        np.concatenate([np.stack(one, axis=1) for one in textures]),
-        np.append(part, part[edges[:, 0]]),
-        np.append(fixed, np.zeros(len(edges), bool)),
-        edges,
-    )
+    corners, uv = (np.concatenate([np.stack(one, axis=1) for one in every]) for every in (faces, textures))
+    part, fixed = np.append(part, part[edges[:, 0]]), np.append(fixed, np.zeros(len(edges), bool))
+    return np.concatenate([points, new]), corners, uv, part, fixed, edges
 
 
 def _triangles(model: LeafModel, faces: Integers) -> tuple[Integers, Floats, Integers]:
@@ -411,7 +406,7 @@ def spined(model: LeafModel, spines: Spines, part: Integers) -> tuple[LeafModel,
     Parameters
     ----------
     part : (f,) int64
-        Its `bodies.closed_parts`, on which spines stand.
+        Its `closed_parts`, on which spines stand.
 
     Returns
     -------
@@ -431,11 +426,9 @@ def spined(model: LeafModel, spines: Spines, part: Integers) -> tuple[LeafModel,
     side = np.cos(turn)[:, None] * x[owner] + np.sin(turn)[:, None] * np.cross(normal, x)[owner]
     along = np.cos(lean)[:, None] * normal[owner] + np.sin(lean)[:, None] * side
     length = spines.length * (0.65 + 0.45 * (0.7548777 * np.arange(len(owner)) % 1.0))
-    across = perpendicular(along)
-    root = place[owner]
-    needles = _pyramids(
-        root, root + length[:, None] * along, across, np.cross(along, across), spines.thickness / 2, _EDGES
-    )
+    root, across = place[owner], perpendicular(along)
+    axes = across, np.cross(along, across)
+    needles = _pyramids(root, root + length[:, None] * along, *axes, spines.thickness / 2, _EDGES)
     made, tints = model, [np.ones((model.polygons, 3))]
     for points, color in ((felt, _FELT), (needles, _SPINE)):
         far = np.linalg.norm(points, axis=-1, keepdims=True)  # none reaches farther than the model, as bounds know it

@@ -84,9 +84,8 @@ class Blade:
             steps = np.arange(self.teeth)[:, None]
             within = np.array([0.0, self._rise])
             if self.tooth == "doubly serrate":
-                within = np.concatenate(
-                    [within, (np.arange(_DOUBLE) + np.array([[0.0], [self._rise]])).ravel() / _DOUBLE]
-                )
+                small = (np.arange(_DOUBLE) + np.array([[0.0], [self._rise]])).ravel() / _DOUBLE
+                within = np.concatenate([within, small])
             elif self.tooth != "serrate":
                 within = np.arange(4) / 4
             y = ((steps + within) / self.teeth).ravel()
@@ -186,15 +185,9 @@ class Blade:
         low, high, a, b = ends[i], ends[i + 1], length[i], length[i + 1]
         middle = (1.0 - self.lobe_depth) * (a + b) / 2.0
         last = i == len(ends) - 2  # from the last lobe to the base there is no sinus
-        pointed = np.where(
-            last,
-            _straight(a, b, high - low, place),
-            np.where(
-                place < 0.5,
-                _straight(a, middle, (high - low) / 2, 2 * place),
-                _straight(b, middle, (high - low) / 2, 2 - 2 * place),
-            ),
-        )
+        near = np.where(place < 0.5, a, b)
+        flank = _straight(near, middle, (high - low) / 2, 2 * np.minimum(place, 1 - place))
+        pointed = np.where(last, _straight(a, b, high - low, place), flank)
         lobe = (1.0 + np.cos(2.0 * np.pi * place)) / 2.0
         rounded = np.where(last, a + (b - a) * place**2, middle + (a + (b - a) * place - middle) * lobe**0.8)
         bulge = np.where(last, 0.0, 0.35 * self.lobe_depth * np.sin(2.0 * np.pi * np.minimum(place, 1 - place)) ** 2)
@@ -219,9 +212,8 @@ class Blade:
             height = -0.5 * np.cos(2.0 * np.pi * phase)
         height = height * np.clip(12.0 * np.minimum(along, 1.0 - along), 0.0, 1.0)
         if self.palmate and self.lobes:  # on the flanks of lobes
-            height = height * np.clip(
-                1.4 * np.abs(np.sin(2.0 * np.pi * self._in_lobe((1.0 - s) * self._most_angle())[1])), 0.0, 1.0
-            )
+            place = self._in_lobe((1.0 - s) * self._most_angle())[1]
+            height = height * np.clip(1.4 * np.abs(np.sin(2.0 * np.pi * place)), 0.0, 1.0)
         return self.tooth_size * height
 
 

@@ -93,29 +93,18 @@ def _along(*factors: float | Floats) -> Floats:
     return np.stack(np.broadcast_arrays(*factors), axis=-1)[..., None, :]
 
 
-def surface(positions: Floats, faces: Integers, uv: Floats, solid: bool = False, error: float = 0.0) -> LeafSurface:
-    """A surface of triangles and quads.
+def _surface(positions: Floats, faces: Integers, uv: Floats, solid: bool = False, error: float = 0.0) -> LeafSurface:
+    """A surface of triangles and quads (f, 4), with positions (k, v, 3) and texture (v, 2) of vertices.
 
-    Parameters
-    ----------
-    positions : (k, v, 3) float64
-    faces : (f, 4) int
-        Vertices; of triangles one is named twice in a row, or the last is -1. Less than three different ones are none.
-    uv : (v, 2) float64
-    solid, error
-        As of `LeafSurface`.
+    Of triangles a vertex is named twice in a row. Less than three different ones are none.
     """
-    faces = np.where(faces < 0, faces[:, :1], faces)
     kept = faces != np.roll(faces, -1, axis=1)
     whole = kept.sum(axis=1) >= 3
     faces, kept = faces[whole], kept[whole]
-    corners = faces[kept]
-    used, corners = np.unique(corners, return_inverse=True)
-    corners = corners.reshape(-1)
+    used, corners = np.unique(faces[kept], return_inverse=True)
+    corners = corners.reshape(-1).astype(np.int32)
     offsets = np.concatenate([[0], np.cumsum(kept.sum(axis=1))]).astype(np.int32)
-    return LeafSurface(
-        positions[:, used], corners.astype(np.int32), offsets, uv[used][corners], np.full(len(faces), solid), error
-    )
+    return LeafSurface(positions[:, used], corners, offsets, uv[used][corners], np.full(len(faces), solid), error)
 
 
 def joined(parts: Sequence[LeafSurface]) -> LeafSurface:
@@ -148,7 +137,7 @@ def tube(points: Floats, radius: Floats, sides: int) -> LeafSurface:
     quads = np.stack([i * sides + j, i * sides + after, (i + 1) * sides + after, (i + 1) * sides + j], axis=-1)
     u = np.tile(0.5 + 0.5 * np.cos(turn), rings)
     v = np.repeat(np.linspace(0.0, 1.0, rings), sides)
-    return surface(places, quads.reshape(-1, 4), np.stack([u, v], axis=1), solid=True)
+    return _surface(places, quads.reshape(-1, 4), np.stack([u, v], axis=1), solid=True)
 
 
 _GOLDEN_ANGLE = np.radians(137.508)
@@ -253,10 +242,8 @@ def _needles(
     flat, three = tolerance > FLAT, tolerance > _THREE
     along, wide = next((np.array(along), np.array(wide)) for error, along, wide in _PROFILES if tolerance > error)
     rings, (variants, count) = len(along), length.shape
-    reach = length[..., None, None]
-    axis = start[:, :, None] + reach * (
-        along[:, None] * direction[:, :, None] + needles.bend * (along**2)[:, None] * toward[:, :, None]
-    )
+    way = along[:, None] * direction[:, :, None] + needles.bend * (along**2)[:, None] * toward[:, :, None]
+    axis = start[:, :, None] + length[..., None, None] * way
     across = np.cross(direction, toward + 1e-3)
     across /= np.maximum(np.linalg.norm(across, axis=2, keepdims=True), 1e-9)
     other = np.cross(across, direction)
@@ -274,7 +261,7 @@ def _needles(
     v = np.append(np.repeat(along[:-1], sides), 1.0)
     u = np.append(np.tile(0.5 + 0.5 * np.cos(turn), rings - 1), 0.5)
     uv = np.tile(np.stack([u, v], axis=1), (count, 1))
-    return surface(points.reshape(variants, -1, 3), faces, uv, solid=not flat)
+    return _surface(points.reshape(variants, -1, 3), faces, uv, solid=not flat)
 
 
 #: Tolerance of the outline that all others are taken from.
@@ -297,9 +284,8 @@ def _dense(blade: Blade, side: int) -> tuple[Floats, Floats]:
 
 def outline(blade: Blade, tolerance: float = FINEST) -> Floats:
     """Closed outline (n, 2) of a flat blade within a tolerance, from the base along its right half and back."""
-    right, left = (
-        points[simplified(points[:, None], tolerance)] for _, points in (_dense(blade, 1), _dense(blade, -1))
-    )
+    right, left = (_dense(blade, side)[1] for side in (1, -1))
+    right, left = (points[simplified(points[:, None], tolerance)] for points in (right, left))
     return np.concatenate([right, left[-2:0:-1]])
 
 
@@ -362,7 +348,7 @@ def blade_surface(blade: Blade, tolerance: float, amount: float = 1.0) -> LeafSu
     places = places[first]
     bent = bend(blade, places, amount)
     scale, start = 1.0 - blade.petiole, np.array([0.0, blade.petiole, 0.0])
-    made = surface(bent * scale + start, every, places + [0.5, 0.0], error=tolerance * scale)
+    made = _surface(bent * scale + start, every, places + [0.5, 0.0], error=tolerance * scale)
     return joined([made, _petiole(blade, rows)]) if blade.petiole and tolerance < 0.02 else made
 
 
@@ -439,9 +425,8 @@ def bend(blade: Blade, flat: Floats, amount: float = 1.0) -> Floats:
     """
     x, y = flat[:, 0], flat[:, 1]
     # Of each variant (k, 1), from -1 to 1.
-    lean, larger, folded, curled, waved, phase, turned, cupped = (
-        amount * variant_offsets(i)[:, None] for i in range(8)
-    )
+    offsets = (amount * variant_offsets(i)[:, None] for i in range(8))
+    lean, larger, folded, curled, waved, phase, turned, cupped = offsets
     half = max(blade.width / 2.0, 1e-6)
     across = np.abs(x) / half
     wide = x * (1.0 + 0.06 * larger * np.sign(x) * 4.0 * np.clip(y * (1.0 - y), 0.0, 1.0))
@@ -454,16 +439,15 @@ def bend(blade: Blade, flat: Floats, amount: float = 1.0) -> Floats:
     turn = (np.radians(blade.twist) + 0.2 * turned) * y
     cos, sin = np.cos(turn), np.sin(turn)
     bow = -blade.curl * y**2  # the midrib itself does not turn
-    return np.stack(
-        [wide * cos + (z - bow) * sin, np.broadcast_to(high, z.shape), bow + (z - bow) * cos - wide * sin], 2
-    )
+    aside, rise = wide * cos + (z - bow) * sin, bow + (z - bow) * cos - wide * sin
+    return np.stack([aside, np.broadcast_to(high, z.shape), rise], 2)
 
 
 def _petiole(blade: Blade, rows: int) -> LeafSurface:
     """The petiole: a tube from the twig to the blade, a little bent; its texture lies below that of the blade."""
     rings = 4 if rows > 8 else 2
     along = np.linspace(0.0, 1.0, rings)
-    points = np.zeros((len(variant_offsets(0)), rings, 3))
+    points = np.zeros((VARIANTS, rings, 3))
     points[..., 1] = blade.petiole * along
     points[..., 2] = -0.1 * blade.petiole * np.sin(np.pi * along) * (1.0 + 0.5 * variant_offsets(9)[:, None])
     points[..., 0] = 0.06 * blade.petiole * np.sin(np.pi * along) * variant_offsets(10)[:, None]

@@ -132,15 +132,7 @@ _ROUNDING = 1e-6  # a hair of tolerance: level ground passes a slope limit of 0 
 class SiteDraw(IntEnum):
     """What a number is drawn for."""
 
-    TRIANGLE = 1
-    SIDE = 2
-    ALONG = 3
-    AZIMUTH = 4
-    SCALE = 5
-    SPECIES = 6
-    SEED = 7
-    SUITABLE = 8
-    FOUNDER = 9
+    TRIANGLE, SIDE, ALONG, AZIMUTH, SCALE, SPECIES, SEED, SUITABLE, FOUNDER = range(1, 10)
     COMPANION = 16  # one for each rule from here on
 
 

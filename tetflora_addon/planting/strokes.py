@@ -29,14 +29,7 @@ _TINY, _MOST_DABS = 1e-9, 64
 
 
 class _Draw(IntEnum):
-    X = 1
-    Y = 2
-    CHANCE = 3
-    AZIMUTH = 4
-    SCALE = 5
-    SPECIES = 6
-    SEED = 7
-    RANK = 8
+    X, Y, CHANCE, AZIMUTH, SCALE, SPECIES, SEED, RANK = range(1, 9)
 
 
 @dataclass(frozen=True)

@@ -314,9 +314,8 @@ class _Aged:
         if o > self.stem:
             old = min(now, 1.0)
             lean = 0.7 + 0.3 * old
-            changes["angle"] = Range(
-                order.angle_tip + (order.angle.mean - order.angle_tip) * lean, order.angle.variation
-            )
+            mean = order.angle_tip + (order.angle.mean - order.angle_tip) * lean
+            changes["angle"] = Range(mean, order.angle.variation)
             if order.attraction.mean < 0:
                 changes["attraction"] = order.attraction.scaled(0.2 + 0.8 * old)
         return self._barked(replace(order, **changes))
@@ -345,9 +344,9 @@ class _Aged:
             flowers = 1.0
         tier = o - self.stem
         extra = _EXTRA[tier] if 0 <= tier < len(_EXTRA) and order.branch_start.mean < _ROSETTE else 0.0
-        laterals = self._nodes(o, order.branch_start.mean, more, until, self._kept(o), 1.0, extra, self.fresh)
-        spurs = self._nodes(o, order.spur_start.mean, 1.0, 1.0, factor=0.0 if self.dead else flowers)
-        return [laterals, spurs, self._dead_nodes(o)]
+        laterals = self._nodes(o, order.branch_start.mean, more, until, self._kept(o), extra)
+        number, spurs = self._nodes(o, order.spur_start.mean)
+        return [laterals, (0.0 if self.dead else flowers * number, spurs), self._dead_nodes(o)]
 
     def _leader(self, o: int) -> float:
         """Fraction of an axis, from its tip down, that is bare of branches in a small plant."""
@@ -355,25 +354,21 @@ class _Aged:
         return new * (_LEADER + (1 - _LEADER) * new)
 
     def _nodes(
-        self,
-        o: int,
-        start: float,
-        more: float,
-        until: float,
-        kept: float = 1.0,
-        factor: float = 1.0,
-        extra: float = 0.0,
-        fresh: float = 0.0,
+        self, o: int, start: float, more: float = 1.0, until: float = 1.0, kept: float = 1.0, extra: float = 0.0
     ) -> tuple[float, Nodes]:
-        """Factor on a number of children, and their nodes; with so many more of them below the crown."""
+        """Factor on a number of children, and their nodes; with so many more of them below the crown.
+
+        ``extra`` more live for a while; 0 where none may.
+        """
         start, now = min(start, 0.99), 1.0 if o < self.stem else self.now[o]
         power = 1.0 if start > _ROSETTE else _POWER
         law = NodeLaw(start, 1.0, power, 1.0, more * start / ((1 - start) * power))
         first, top = (float(law.number_at(place)) for place in (self._bare(o, start), until * now))
+        fresh = self.fresh if extra else 0.0
         number = kept * (top - first) * (1 + extra * fresh)
         if number <= 0:
             return 0.0, Nodes(0.0, 0.0, start)
-        return factor * number, Nodes(1 / number, law.below / number, start, 1.0, power, until, kept, extra, fresh)
+        return number, Nodes(1 / number, law.below / number, start, 1.0, power, until, kept, extra, fresh)
 
     def _kept(self, o: int) -> float:
         """Fraction of the laterals of an order that age has left."""

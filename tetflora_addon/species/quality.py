@@ -82,13 +82,14 @@ def with_quality(species: Species, quality: float) -> Species:
         few = {"number": dead.number.scaled(quality), "on_limbs": dead.on_limbs.scaled(quality)}
         species = replace(species, dead=replace(dead, **few))
     members = expected_members(species)  # in which sides and segments have no part
+
+    def thinned(shapes: list[tuple[float, float]], detail: float) -> Species:
+        return _thinned(_shaped(species, shapes), members, detail)
+
     # Sides and segments as real numbers make the count continuous; once they are whole, members make up for it.
-    detail = _bisected(
-        lambda d: expected_polygons(_thinned(_shaped(species, _shapes(species, members, d)), members, d)), target
-    )
-    shaped = _shaped(species, [(round(k), round(s)) for k, s in _shapes(species, members, detail)])
-    detail = _bisected(lambda d: expected_polygons(_thinned(shaped, members, d)), target)
-    return _kept(species, _thinned(shaped, members, detail))
+    detail = _bisected(lambda d: expected_polygons(thinned(_shapes(species, members, d), d)), target)
+    shapes = [(round(k), round(s)) for k, s in _shapes(species, members, detail)]
+    return _kept(species, thinned(shapes, _bisected(lambda d: expected_polygons(thinned(shapes, d)), target)))
 
 
 def _tiers(species: Species) -> list[Order]:
@@ -177,9 +178,8 @@ def _allowed(order: Order, name: str, factor: float) -> float:
 
 def _scaled(order: Order, **factors: float) -> Order:
     """An order with some of its ranges times factors, as far as their keys allow."""
-    return replace(
-        order, **{name: getattr(order, name).scaled(_allowed(order, name, factors[name])) for name in factors}
-    )
+    scaled = {name: getattr(order, name).scaled(_allowed(order, name, factors[name])) for name in factors}
+    return replace(order, **scaled)
 
 
 def _kept(described: Species, changed: Species) -> Species:

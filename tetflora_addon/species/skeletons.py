@@ -149,9 +149,8 @@ def nurbs_chain(
     for k in range(2, order + 1):
         m = n + order - k
         rise, fall = knots[k - 1 : k - 1 + m] - knots[:m], knots[k : k + m] - knots[1 : m + 1]
-        basis = (u - knots[:m]) / np.maximum(rise, 1) * (rise > 0) * basis[:, :m] + (knots[k : k + m] - u) / np.maximum(
-            fall, 1
-        ) * (fall > 0) * basis[:, 1 : m + 1]
+        rising = (u - knots[:m]) / np.maximum(rise, 1) * (rise > 0) * basis[:, :m]
+        basis = rising + (knots[k : k + m] - u) / np.maximum(fall, 1) * (fall > 0) * basis[:, 1 : m + 1]
     basis = basis * weights
     total = basis.sum(axis=1, keepdims=True)
     points = basis @ control / np.where(total > 0, total, 1.0)

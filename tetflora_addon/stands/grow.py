@@ -98,18 +98,7 @@ _ASIDE = 0.6
 class StandDraw(IntEnum):
     """What a random number of a plant, or of a place, is drawn for."""
 
-    X = 1
-    Y = 2
-    PLANTABLE = 3
-    SPECIES = 4
-    STRENGTH = 5
-    SEED = 6
-    DEATH = 7
-    OLD = 8
-    FALL = 9
-    LEAN = 10
-    LIE = 11
-    COME = 12
+    X, Y, PLANTABLE, SPECIES, STRENGTH, SEED, DEATH, OLD, FALL, LEAN, LIE, COME = range(1, 13)
 
 
 @dataclass(frozen=True)
@@ -228,15 +217,7 @@ _STANDS, _LIES, _DEAD_DIAMETER, _BREAKS = (2.0, 22.0), (8.0, 40.0), 0.4, 0.1
 def grown(
     plants: Plants, crowns: Crowns, taken: NDArray, light: LightGrid, traits: StandTraits, block: slice
 ) -> Plants:
-    """Some plants a year later.
-
-    Parameters
-    ----------
-    crowns, taken
-        Of these plants: where they are, and the light that they take, m².
-    block : slice
-        Of all plants.
-    """
+    """A block of plants a year later, by the crowns of all and the light that these take, m²."""
     one = plants.take(block)
     x, y, radius, base, height = (v[block] for v in (crowns.x, crowns.y, crowns.radius, crowns.base, crowns.height))
     species, taken = one.species, taken[block]
@@ -296,9 +277,8 @@ def _offset(a: Floats, b: Floats) -> Floats:
 def _increment(one: Plants, wood: NDArray, lit: NDArray, traits: StandTraits) -> Floats:
     """By how much plants (n,) become thicker that make so much wood, kg, and have so much of the light of free ones."""
     step = 0.002
-    rise = (
-        np.maximum(traits.heights(one.species, one.basal + step) - traits.heights(one.species, one.basal), 0.0) / step
-    )
+    low, high = (traits.heights(one.species, one.basal + thicker) for thicker in (0.0, step))
+    rise = np.maximum(high - low, 0.0) / step
     more = np.take(traits.mass_factor, one.species) * one.basal * (2.0 * one.height + one.basal * rise)
     most = np.take(traits.diameter_increment, one.species) * one.quality * one.strength
     most *= np.minimum((1.0 + _HALF_LIT) * lit / (lit + _HALF_LIT), 1.0)
@@ -352,15 +332,7 @@ _OUTSIDE = 0.1
 
 
 def planted(site: StandSite, traits: StandTraits, suitability: Floats, density: float, seed: int) -> Plants:
-    """Plants evenly spread, each somewhere in a square of its own.
-
-    Parameters
-    ----------
-    suitability : (g, cells) float64
-        How well each species grows.
-    density : float
-        Plants on a hectare.
-    """
+    """So many plants on a hectare, each somewhere in a square of its own, by how well species grow (g, cells)."""
     if density <= 0.0 or traits.planted.sum() <= 0.0:
         return Plants.empty()
     width, depth = site.size
@@ -388,13 +360,7 @@ def planted(site: StandSite, traits: StandTraits, suitability: Floats, density: 
 
 
 class SeedDispersal:
-    """Seeds that fall on a site, and where they can become plants.
-
-    Attributes
-    ----------
-    cell : float
-        Meters of the grid on which seeds are spread.
-    """
+    """Seeds that fall on a site, and where they can become plants."""
 
     def __init__(self, site: StandSite, traits: StandTraits, suitability: Floats, most: float, outside: float) -> None:
         """Of a site, for species that grow so well on its cells.
@@ -474,9 +440,7 @@ def _smoothed(values: Floats, reach: int, axis: int) -> Floats:
     reach = min(reach, (size - 1) // 2)
     if reach < 1:
         return values
-    wide = np.concatenate(
-        [values.take(range(size - reach - 1, size), axis), values, values.take(range(reach), axis)], axis
-    )
+    wide = np.pad(values, [(reach + 1, reach) if one == axis else (0, 0) for one in (0, 1)], "wrap")
     sums = np.cumsum(wide, axis)
     span = 2 * reach + 1
     return (sums.take(range(span, span + size), axis) - sums.take(range(size), axis)) / span

@@ -184,9 +184,8 @@ class StandTraits:
         self.breast = np.minimum(BREAST_HEIGHT, 0.25 * self.height)
         rate, power = self.height_curve.T
         self.cost = 0.35 * self.light_compensation
-        self.free = np.round(
-            -np.expm1(-self.extinction * self.leaves) - self.cost * self.extinction * self.leaves, _TRAIT_DIGITS
-        )
+        taken = -np.expm1(-self.extinction * self.leaves)
+        self.free = np.round(taken - self.cost * self.extinction * self.leaves, _TRAIT_DIGITS)
         # As slender below breast height as just above it.
         near = np.minimum(_SLOPE, 0.05 * self.diameter)
         slope = (self.height - self.breast) * (-np.expm1(-rate * near)) ** power / near
@@ -194,10 +193,8 @@ class StandTraits:
         self._step = _UPTO * self.diameter / _HEIGHTS
         basal = self._step[:, None] * np.arange(_HEIGHTS + 1)
         dbh = np.maximum(basal - self.first[:, None], 0.0)
-        grown = (
-            self.breast[:, None]
-            + (self.height - self.breast)[:, None] * (-np.expm1(-rate[:, None] * dbh)) ** power[:, None]
-        )
+        part = (-np.expm1(-rate[:, None] * dbh)) ** power[:, None]
+        grown = self.breast[:, None] + (self.height - self.breast)[:, None] * part
         self._heights = np.round(grown, _TRAIT_DIGITS)
         # Dry mass is this × basal² × height.
         self.mass_factor = np.round(self.form_factor * self.wood_density * np.pi / 4, _TRAIT_DIGITS)

@@ -328,25 +328,18 @@ class _LeafBearers:
         for bearers, counts, owner, index, key in self._runs(form, vertices):
             t, larger = foliage.leaf_places(rows, bearers.branches, owner, index, counts, key), None
             leaves = foliage.place_leaves(rows, bearers.branches, bearers.lines, owner, index, key, t)
-            frame = foliage.in_wind(
-                rows, bearers.branches, leaves, foliage.settled(rows, self.row, leaves.frame, leaves.light, leaves.sky)
-            )
+            frame = foliage.settled_in_wind(rows, bearers.branches, leaves)
             if thin is not None and not rows["envelope"][self.row[0]]:
                 kept, times = thin(key, *copies.spheres(leaves.position, frame, leaves.size))
                 owner, index, key, t, frame = (gathered(of, kept) for of in (owner, index, key, t, frame))
                 leaves, larger = leaves.take(kept), np.sqrt(times)
-            gradient = rows["gradient"][self.row[0]]
-            places = (
-                (foliage.outwardness(rows, bearers.branches, owner, t), foliage.youth(rows, self.row, t))
-                if gradient
-                else ()
-            )
-            motion = None
+            places, motion = (), None
+            if rows["gradient"][self.row[0]]:
+                places = foliage.outwardness(rows, bearers.branches, owner, t), foliage.youth(rows, self.row, t)
             if bearers.lines.later is not None:
                 branches, seconds = bearers.branches.moved(), moment(rows)
                 again = foliage.place_leaves(rows, branches, bearers.lines.later, owner, index, key, t)
-                turned = foliage.settled(rows, self.row, again.frame, again.light, again.sky)
-                turned = foliage.in_wind(rows, branches, again, turned, seconds)
+                turned = foliage.settled_in_wind(rows, branches, again, seconds)
                 motion = (again.position - leaves.position) / seconds, (turned - frame) / np.float32(seconds)
             if leaves.stages is not None:
                 places = (*(places or (None, None)), leaves.stages, np.take(bearers.branches.year[:, 1], owner))

@@ -140,27 +140,21 @@ class Curve:
         return center, np.stack([first.T, cross(along, first).T])
 
 
-def curve(lines: Axes, radius: Floats, weight: Floats) -> Curve:
-    """The curves of branches.
-
-    Parameters
-    ----------
-    lines : Axes of n
-    radius : (n, S + 1) float64
-        At joints; curves stay within a part of it.
-    weight : (n,) float64
-        0 for straight segments, 1 for the whole curve.
-    """
+def _curve(flora: Flora, branches: Branches, lines: Axes, weight: Floats) -> Curve:
+    """The curves of branches (n), which stay within a part of their own thickness: straight for a weight (n,) of 0."""
     n, most = len(lines.segments), lines.frames.shape[1]
+    t = np.minimum(np.arange(most + 1) / lines.segments[:, None], 1.0)
+    owner = np.repeat(np.arange(n), most + 1)
+    radius = radius_at(flora.rows, _without_places(branches, owner), t.ravel()).reshape(n, most + 1)
     there = np.arange(most) < lines.segments[:, None]
     chord = np.diff(lines.knots, axis=1)
     length = _norm(chord)[..., None]
     ahead = np.where(there[..., None], lines.frames[..., 2], 0.0)
     # Beyond the tip both are zero, so that the last joint has the direction of its segment.
     none = np.zeros((n, 1, 3))
-    tangent = unit_of(np.concatenate([none, ahead], axis=1) + np.concatenate([ahead, none], axis=1))
+    tangent = _unit_of(np.concatenate([none, ahead], axis=1) + np.concatenate([ahead, none], axis=1))
     first = np.where(there[..., None], lines.frames[..., 0], 0.0)
-    across = unit_of(np.concatenate([none, first], axis=1) + np.concatenate([first, none], axis=1))
+    across = _unit_of(np.concatenate([none, first], axis=1) + np.concatenate([first, none], axis=1))
     start, end = tangent[:, :-1] * length - chord, tangent[:, 1:] * length - chord
     allowed = _ASIDE * np.minimum(radius[:, :-1], radius[:, 1:])
     share = allowed / np.maximum(2.0 * _HERMITE * np.maximum(_norm(start), _norm(end)), 1e-300)
@@ -177,7 +171,7 @@ def parts(deviation: Floats, pixel: Floats) -> Integers:
     return np.clip(number, 1, MOST_RINGS).astype(np.int64)
 
 
-def unit_of(vectors: Floats) -> Floats:
+def _unit_of(vectors: Floats) -> Floats:
     """Vectors (..., 3) scaled to length 1."""
     return vectors / np.maximum(_norm(vectors), 1e-300)[..., None]
 
@@ -210,7 +204,7 @@ def rings_of(flora: Flora, whole: WholeBranches) -> Rings:
     """Rings at the joints of branches, and some where a base is flared."""
     rows, branches = flora.rows, whole.branches
     owner, t, center = whole.knots(rows)
-    radius = radius_at(rows, without_places(branches, owner), t).astype(np.float32)
+    radius = radius_at(rows, _without_places(branches, owner), t).astype(np.float32)
     later = None
     if whole.lines.later is not None:
         moved = WholeBranches(branches, whole.lines.later).knots(rows)[2]
@@ -230,7 +224,7 @@ def fine_counts(flora: Flora, whole: WholeBranches, fine: Fineness, pixels: Pixe
     rows, branches, lines = flora.rows, whole.branches, whole.lines
     n, most = len(branches), lines.frames.shape[1]
     there = np.arange(most) < lines.segments[:, None]
-    bent = _curve(flora, whole, fine.weight)
+    bent = _curve(flora, branches, lines, fine.weight)
     reach = np.repeat(branches.radius * flora.widest[branches.row], most + 1)
     pixel = pixels.extent(lines.knots.reshape(-1, 3), reach).reshape(n, -1)
     pixel = np.minimum(pixel[:, :-1], pixel[:, 1:])
@@ -258,17 +252,17 @@ def fine_rings(flora: Flora, whole: WholeBranches, fine: Fineness, counts: Integ
     ahead = segment == 0
     x[ahead] = _stretched(x[ahead], _falls(rows, branches, segments)[owner[ahead]])
     t = (segment + x) / segments[owner]
-    some = without_places(branches, owner)
+    some = _without_places(branches, owner)
     sides = int(fine.sides[0])
     # As round as it is, the tube has the surface that its species' coarse one has.
     sparse = tube_perimeter(rows["sides"][branches.row]) / tube_perimeter(np.array([sides]))
     radius = radius_at(rows, some, t) * sparse[owner]
-    wider = 1.0 + fine.weight * (below_forks(rows, branches) - 1.0)
-    radius *= widening(wider[owner], t)
+    wider = 1.0 + fine.weight * (_below_forks(rows, branches) - 1.0)
+    end = np.clip((t - _WIDENS) / (1.0 - _WIDENS), 0.0, 1.0)
+    radius *= 1.0 + (wider[owner] - 1.0) * end * end * (3.0 - 2.0 * end)
     more, length = collars(rows, branches)
-    radius += (fine.weight * more * branches.radius)[owner] * np.exp(
-        -((t * branches.length[owner] / length[owner]) ** 2)
-    )
+    fall = np.exp(-((t * branches.length[owner] / length[owner]) ** 2))
+    radius += (fine.weight * more * branches.radius)[owner] * fall
     allowed = np.maximum(flora.widest[branches.row][owner] * branches.radius[owner] - radius, 0.0)
     light = radius.astype(np.float32)
     swollen = swelling(rows, branches, fine.weight, owner, t, radius, sides)
@@ -288,7 +282,7 @@ def fine_rings(flora: Flora, whole: WholeBranches, fine: Fineness, counts: Integ
     light[above] *= narrow.astype(np.float32)
 
     def placed(lines: Axes) -> tuple[NDArray, NDArray]:
-        center, across = _curve(flora, replace(whole, lines=lines), fine.weight).at(owner, segment, x, allowed)
+        center, across = _curve(flora, branches, lines, fine.weight).at(owner, segment, x, allowed)
         center += down
         tip = lines.frames[last, segments[last] - 1, :, 2]
         center[above] += high[:, None] * tip
@@ -308,11 +302,11 @@ def foot_rings(flora: Flora, whole: WholeBranches, fine: Fineness) -> tuple[Ring
     if not len(own):
         return None
     trunks, weight = branches.take(own), fine.weight[own]
-    path, width, which = roots(rows, trunks, weight)
+    path, width, which = _roots(rows, trunks, weight)
     many, places = path.shape[:2]
     length = np.linalg.norm(np.diff(path, axis=1), axis=2).sum(axis=1)
     wood = replace(trunks.take(which), radius=width[:, 0], length=np.maximum(length, 1e-9), later=None)
-    along = unit_of(np.gradient(path, axis=1)).reshape(-1, 3)
+    along = _unit_of(np.gradient(path, axis=1)).reshape(-1, 3)
     aside = unit(np.cross(along, [0.0, 0.0, 1.0]) + [1e-9, 0.0, 0.0])
     axes = np.stack([aside, np.cross(along, aside)])
     turn = np.repeat(trunks.frame[which], places, axis=0)
@@ -323,15 +317,6 @@ def foot_rings(flora: Flora, whole: WholeBranches, fine: Fineness) -> tuple[Ring
     reach = (width.ravel() * axes).astype(np.float32)
     still = None if whole.lines.later is None else (center, reach)
     return Rings(wood, owner, t, center, reach, _goes_on(owner), still), own[which]
-
-
-def _curve(flora: Flora, whole: WholeBranches, weight: Floats) -> Curve:
-    """The curves of branches, which stay within their own thickness."""
-    n, joints = whole.lines.knots.shape[:2]
-    t = np.minimum(np.arange(joints) / whole.lines.segments[:, None], 1.0)
-    owner = np.repeat(np.arange(n), joints)
-    radius = radius_at(flora.rows, without_places(whole.branches, owner), t.ravel()).reshape(n, joints)
-    return curve(whole.lines, radius, weight)
 
 
 def _falls(rows: Table, branches: Branches, segments: Integers) -> Floats:
@@ -354,7 +339,7 @@ def _goes_on(owner: Integers) -> Mask:
     return out
 
 
-def without_places(branches: Branches, index: Integers) -> Branches:
+def _without_places(branches: Branches, index: Integers) -> Branches:
     """Selection of all that numbers and radii depend on; places and frames, which are most of the memory, are zero."""
     n = len(index)
     names = ("row", "plant", "key", "length", "radius", "scale", "vigor", "outward")
@@ -464,7 +449,7 @@ def depths(footed: Mask, number: Integers) -> tuple[Floats, Floats]:
     return np.where(footed, SUNK, np.sin(angle)), np.where(footed, 1.0, np.cos(angle))
 
 
-def below_forks(rows: Table, branches: Branches) -> Floats:
+def _below_forks(rows: Table, branches: Branches) -> Floats:
     """How much wider branches (n,) are where they fork, over their radius there: as wide as the stems beyond begin.
 
     Stems share the cross-section of what forks, and flare at their base by what the expected number of them takes.
@@ -474,12 +459,6 @@ def below_forks(rows: Table, branches: Branches) -> Floats:
     number = np.maximum(branch_counts(rows, branches, FORK), 1)
     wider = (1.0 + rows["flare"][beyond]) * number ** (-1.0 / np.maximum(rows["fork_power"][branches.row], 1e-9))
     return np.where(beyond >= 0, wider, 1.0)
-
-
-def widening(wider: Floats, t: Floats) -> Floats:
-    """Factor (n,) of the radius at fractions t (n,) of branches that are so much wider (n,) at their end."""
-    x = np.clip((t - _WIDENS) / (1.0 - _WIDENS), 0.0, 1.0)
-    return 1.0 + (wider - 1.0) * x * x * (3.0 - 2.0 * x)
 
 
 def root_number(key: Keys) -> Integers:
@@ -539,16 +518,10 @@ def swelling(
     return np.maximum(1.0 + size * shape[:, owner], _LEAST_RADIUS).astype(np.float32)
 
 
-def roots(rows: Table, trunks: Branches, weight: Floats) -> tuple[Floats, Floats, Integers]:
+def _roots(rows: Table, trunks: Branches, weight: Floats) -> tuple[Floats, Floats, Integers]:
     """Surface roots of trunks (n,): they leave the buttresses, wind along the ground and lead into it.
 
-    Returns
-    -------
-    path : (m, PLACES, 3) float64
-        In the frames of the trunks' bases, meters.
-    width : (m, PLACES) float64
-        Radii, meters.
-    trunk : (m,) int64
+    Places (m, `PLACES`, 3) in the frames of the trunks' bases, radii (m, `PLACES`), meters, and trunks (m,).
     """
     angle, size = buttresses(trunks.key)
     trunk, which = spread(root_number(trunks.key))
@@ -558,10 +531,8 @@ def roots(rows: Table, trunks: Branches, weight: Floats) -> tuple[Floats, Floats
     flare = rows["flare"][trunks.row][trunk]
     x = np.linspace(0.0, 1.0, PLACES)
     away = base[:, None] * (0.5 + 0.4 * flare[:, None] + (1.4 + 1.8 * uniform(own, 0))[:, None] * x)
-    wave = (
-        0.35 * np.sin(2 * np.pi * (uniform(own, 1)[:, None] + 1.1 * x))
-        - 0.35 * np.sin(2 * np.pi * uniform(own, 1))[:, None]
-    )
+    begin = uniform(own, 1)[:, None]
+    wave = 0.35 * np.sin(2 * np.pi * (begin + 1.1 * x)) - 0.35 * np.sin(2 * np.pi * begin)
     turn = angle[:, None] + wave * x
     width = (base * (0.14 + 0.16 * size) * np.minimum(flare + 0.4, 1.2))[:, None] * (1.0 - 0.72 * x)
     # Nearly level at first, with what is over the ground less and less; sunk as a whole where seen from afar.
@@ -606,7 +577,7 @@ def bud_rings(flora: Flora, whole: WholeBranches, fine: Fineness) -> tuple[Rings
     side = np.flatnonzero(~at_end)
     # Leaves are placed branch row by branch row: the same for all where there is one.
     t[side] = leaf_places(rows, branches, owner[side], index[side], number, key[side])
-    some = without_places(branches, owner)
+    some = _without_places(branches, owner)
     radius = radius_at(rows, some, t)
     sort = [species.bud for species in flora.species]
     table = np.array([(0.0, 0.0) if bud is None else (bud.length, bud.width) for bud in sort])

@@ -8,6 +8,7 @@ surface of the twig's tube, turned about its line at random: over many twigs the
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from operator import attrgetter
 
 import numpy as np
 from numpy.typing import NDArray
@@ -64,9 +65,8 @@ def tube_buffers(
     MeshBuffers or None
         Quads with ``UVMap``, ``tf_color``, ``tf_transmission`` and ``tf_girth``; None without branches.
     """
-    sorts = sorted(
-        (sort for some in whole for sort in _sorts(flora, some, pixels, most_sides)), key=lambda sort: sort.sides
-    )
+    sorts = [sort for some in whole for sort in _sorts(flora, some, pixels, most_sides)]
+    sorts.sort(key=attrgetter("sides"))
     if not sorts:
         return None
     vertices, faces = (sum(numbers) for numbers in zip(*(sort.numbers() for sort in sorts), strict=True))
@@ -118,10 +118,9 @@ class _TubeGroup:
         for some in chunks(self.rings * self.sides, 8 * _RING_BATCH):
             whole, fine = self.whole.take(some), self.fine.take(some)
             yield fine_rings(flora, whole, fine, self.counts[some]), self.sides, whole
-            if (foot := foot_rings(flora, whole, fine)) is not None:
-                yield foot[0], root_sides(self.sides), whole.take(foot[1])
-            if (buds := bud_rings(flora, whole, fine)) is not None:
-                yield buds[0], int(bud_sides(self.sides)), whole.take(buds[1])
+            for besides, sides in ((foot_rings, root_sides), (bud_rings, bud_sides)):
+                if (found := besides(flora, whole, fine)) is not None:
+                    yield found[0], int(sides(self.sides)), whole.take(found[1])
 
 
 def _sorts(
@@ -132,10 +131,8 @@ def _sorts(
         return
     sides = flora.rows["sides"][whole.branches.row]
     sides = sides if most_sides is None else np.minimum(sides, most_sides)
-    near = np.zeros(len(whole), bool)
-    if pixels is not None:
-        fine = fineness(flora, whole, pixels)
-        near = fine.weight > 0
+    fine = None if pixels is None else fineness(flora, whole, pixels)
+    near = np.zeros(len(whole), bool) if fine is None else fine.weight > 0
     far = np.flatnonzero(~near)
     rings = whole.lines.segments + flora.rows["rings"][whole.branches.row] + 1
     for k in np.unique(sides[far]):

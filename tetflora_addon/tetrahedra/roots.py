@@ -173,9 +173,8 @@ def _around_box(window: tuple[float, float, float, float], low: Floats, high: Fl
     def wall(a: tuple[float, float], b: tuple[float, float]) -> Floats:
         return np.array([(*a, 0.0), (*b, 0.0), (*b, far)])
 
-    middle = _Cut(
-        wall((left, top), (right, top)), _View(block((left, right), (bottom, top))), block((left, right), (top, y1))
-    )
+    view, above = _View(block((left, right), (bottom, top))), block((left, right), (top, y1))
+    middle = _Cut(wall((left, top), (right, top)), view, above)
     middle = _Cut(wall((left, bottom), (right, bottom)), block((left, right), (y0, bottom)), middle)
     middle = _Cut(wall((right, bottom), (right, top)), middle, block((right, x1), (y0, y1)))
     return _Cut(wall((left, bottom), (left, top)), block((x0, left), (y0, y1)), middle)

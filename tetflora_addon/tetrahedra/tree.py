@@ -95,7 +95,7 @@ _CHILDREN, _PLANES = _tables()
 
 
 def _best_diagonal(vertices: Floats) -> Integers:
-    """Diagonal (n,) along which the worst inner piece of tetrahedra (n, 4, 3) has the best quality; the first of equals.
+    """Diagonal (n,) along which the worst inner piece of tetrahedra (n, 4, 3) has the best quality; the first of equal.
 
     All children have the same volume. Let S be the sum of the squared edges, D² the squared diagonal, and p and q the
     squares of the edges whose middles it joins. Two of the inner tetrahedra have edges of (S − p + 4 D²) / 4, two of

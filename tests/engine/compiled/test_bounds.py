@@ -12,7 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tests.engine import support
-from tetflora_addon.compiled.bounds import ring_stretch, unit_bounds, widest_radii
+from tetflora_addon.compiled.bounds import _ring_stretch, unit_bounds, widest_radii
 from tetflora_addon.compiled.flora import Flora
 from tetflora_addon.growth.seeds import Branches
 from tetflora_addon.refinement.contents import bounding_capsules
@@ -200,7 +200,7 @@ def test_rings_at_joints_are_no_wider_than_said(curvature: list, tip: float, seg
     [tube], _ = support.meshes(flora, pieces)
     rings = tube.positions.reshape(segments + 1, 32, 3).astype(float)
     widest = np.linalg.norm(rings - rings.mean(axis=1, keepdims=True), axis=2).max()
-    assert widest <= trunk.radius[0] * ring_stretch(flora.rows)[0] * (1 + 1e-5)
+    assert widest <= trunk.radius[0] * _ring_stretch(flora.rows)[0] * (1 + 1e-5)
 
 
 def test_a_right_angle_makes_wide_rings() -> None:
@@ -211,8 +211,8 @@ def test_a_right_angle_makes_wide_rings() -> None:
     turned = cosine * np.eye(3) - cross + (1 - cosine) * np.outer(diagonal, diagonal)
     x, y = (v / np.linalg.norm(v) for v in (np.eye(3)[:, :2] + turned[:, :2]).T)
     rows = support.compiled(support.small(order0={"segments": 2, "curvature": [0, 0], "curvature_tip": 180})).rows
-    assert np.sqrt(1 + abs(x @ y)) == pytest.approx(ring_stretch(rows)[0])
-    assert ring_stretch(rows)[0] == pytest.approx(2 / np.sqrt(3))
+    assert np.sqrt(1 + abs(x @ y)) == pytest.approx(_ring_stretch(rows)[0])
+    assert _ring_stretch(rows)[0] == pytest.approx(2 / np.sqrt(3))
 
 
 def test_a_flare_of_children_widens_their_parents() -> None:

@@ -18,12 +18,12 @@ from tetflora_addon.compiled.clumping import (
     LEAST,
     MOST,
     Clumping,
+    _path_lengths,
     basis,
     cell_numbers,
     covered,
     elements_of,
     factors,
-    path_lengths,
 )
 from tetflora_addon.compiled.flora import Flora
 from tetflora_addon.growth.growth import trunks
@@ -61,7 +61,7 @@ def test_ways_through_cells_add_up(seed: int) -> None:
     u, v = basis(direction)
     grid = (np.stack(np.meshgrid(np.arange(120), np.arange(120)), axis=-1).reshape(-1, 2) - 60 + rng.random(2)) * 0.05
     origin = shape / 2 + grid[:, :1] * u + grid[:, 1:] * v
-    ray, cell, length = path_lengths(origin, direction, shape)
+    ray, cell, length = _path_lengths(origin, direction, shape)
     ends = np.sort(np.stack([-origin / direction, (shape - origin) / direction]), axis=0)
     whole = np.maximum(ends[1].min(axis=1) - ends[0].max(axis=1), 0)
     np.testing.assert_allclose(np.bincount(ray, length, len(origin)), whole, atol=1e-9)
@@ -73,7 +73,7 @@ def test_points_are_in_the_cells_that_rays_meet_there() -> None:
     rng = np.random.default_rng(5)
     points, shape = rng.random((200, 3)) * [2, 3, 1], np.array([2, 3, 1])
     direction = direction_of(rng)
-    ray, cell, length = path_lengths(points, direction, shape)
+    ray, cell, length = _path_lengths(points, direction, shape)
     # The way that lies on both sides of the origin is the one through the point's own cell.
     own = cell_numbers(points.T, shape)
     assert all(own[i] in cell[ray == i] for i in range(200))

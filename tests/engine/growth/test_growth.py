@@ -22,7 +22,7 @@ from tests.engine import support
 from tetflora_addon.arrays import chunks, spread
 from tetflora_addon.compiled.flora import Flora
 from tetflora_addon.growth.axes import axes
-from tetflora_addon.growth.foliage import face_light, leaf_keys, leaf_places, place_leaves
+from tetflora_addon.growth.foliage import _face_light, leaf_keys, leaf_places, place_leaves
 from tetflora_addon.growth.growth import branch_counts, children, chosen_children, leaf_counts, trunks
 from tetflora_addon.growth.rows import DEAD, FORK, SPUR
 from tetflora_addon.growth.seeds import Branches, Seeds
@@ -215,11 +215,11 @@ def test_leaves_turn_to_the_light(light: float, tilt: float, azimuth: float, rol
     along = np.cos(roll) * side + np.sin(roll) * np.cross(up, side)
     frame = np.stack([np.cross(along, up), along, up], axis=1)[None]
     for share in (light, 0.0, 1.0, 0.5):
-        lit = face_light(frame, np.array([share]), np.array([0.0, 0.0, 1.0]))[0]
+        lit = _face_light(frame, np.array([share]), np.array([0.0, 0.0, 1.0]))[0]
         np.testing.assert_allclose(lit @ lit.T, np.eye(3), atol=1e-7)
         assert np.linalg.det(lit) > 0
         assert lit[2, 2] >= up[2] - 1e-6
-    np.testing.assert_allclose(face_light(frame, np.zeros(1), np.array([0, 0, 1.0]))[0], frame[0], atol=1e-7)
+    np.testing.assert_allclose(_face_light(frame, np.zeros(1), np.array([0, 0, 1.0]))[0], frame[0], atol=1e-7)
 
 
 def table() -> dict[str, Any]:

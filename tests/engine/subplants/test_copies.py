@@ -11,7 +11,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tetflora_addon.growth.foliage import face_light
+from tetflora_addon.growth.foliage import _face_light
 from tetflora_addon.leaves.levels import leaf_kites, leaf_levels
 from tetflora_addon.leaves.models import LEAF_MODELS
 from tetflora_addon.subplants.leaf_meshes import LeafCopies
@@ -85,7 +85,7 @@ def test_single_precision_turns_leaves_to_the_light(seed: int, light: float, til
     up = np.cos(roll)[:, None] * side + np.sin(roll)[:, None] * np.cross(along, side)
     frame = np.stack([np.cross(along, up), along, up], axis=2)
     share, sky = np.array([light]), np.array([0.0, 0.0, 1.0])
-    exact, single = face_light(frame, share, sky), face_light(frame.astype(np.float32), share, sky)
+    exact, single = _face_light(frame, share, sky), _face_light(frame.astype(np.float32), share, sky)
     assert exact.dtype == np.float64
     assert single.dtype == np.float32
     for made in (exact, single):

@@ -28,6 +28,7 @@ from tetflora_addon.subplants.rings import (
     PLACES,
     Fineness,
     Pixels,
+    _roots,
     buttresses,
     collars,
     fine_counts,
@@ -37,7 +38,6 @@ from tetflora_addon.subplants.rings import (
     finer,
     has_foot,
     root_number,
-    roots,
     round_up_to,
 )
 from tetflora_addon.subplants.tubes import tube_buffers
@@ -182,7 +182,7 @@ def test_buttresses_take_what_they_give() -> None:
 
 def test_roots_lead_into_the_ground() -> None:
     flora, whole = straight(flare=1.0)
-    path, width, trunk = roots(flora.rows, whole.branches, np.ones(1))
+    path, width, trunk = _roots(flora.rows, whole.branches, np.ones(1))
     assert len(path) == root_number(whole.branches.key).sum()
     assert path.shape[1] == PLACES
     assert (trunk == 0).all()
