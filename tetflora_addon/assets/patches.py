@@ -38,25 +38,11 @@ _ROUNDS = 6
 
 
 def _classified(positions: Floats, corner_verts: Integers, face_offsets: Integers) -> tuple[Mask, Mask, Floats]:
-    """Classify the faces of a mesh.
+    """Which faces (f,) of a mesh are of solids, which of leaves, and widths (f,) of either, in the unit of positions.
 
-    Parameters
-    ----------
-    positions : (v, 3) float64
-    corner_verts : (c,) int
-    face_offsets : (f + 1,) int
+    The mesh has positions (v, 3), vertices of corners (c,), and first corners of faces (f + 1,). Solids are closed, or
+    tubes with open ends: half of them is never seen. A leaf is a sheet that consists of few faces, and is one of many.
 
-    Returns
-    -------
-    solid : (f,) bool
-        Of a closed surface, or a tube with open ends: half of it is never seen.
-    leaf : (f,) bool
-        Of a sheet that consists of few faces, and is one of many.
-    width : (f,) float64
-        Of the leaf, or the local thickness of the solid, in the unit of the positions.
-
-    Notes
-    -----
     Components are connected faces. The width of a sheet is its area over its extent. That of a solid is 1 / H, with
     Steiner's mean curvature H of polyhedra (half the sum of edge length × signed angle, over the area) averaged over
     neighbors: 2 r for a long tube, r for a ball, no less for rough ground, where bumps and hollows cancel. Edges of
@@ -72,11 +58,13 @@ def _classified(positions: Floats, corner_verts: Integers, face_offsets: Integer
     following[face_offsets[1:] - 1] = face_offsets[:-1]
     label = connected(int(welded.max()) + 1, welded, welded[following])
     component = np.unique(label[welded[face_offsets[:-1]]], return_inverse=True)[1].reshape(-1)
-    vector, center = _measures(positions, corner_verts, face_offsets, following, sizes)
+    points = positions[corner_verts]
+    extent = _extents(points, component[face_of_corner], int(component.max()) + 1)
+    center = np.add.reduceat(points, face_offsets[:-1], axis=0) / sizes[:, None]
+    points = points - np.repeat(center, sizes, axis=0)
+    vector = 0.5 * np.add.reduceat(np.cross(points, points[following]), face_offsets[:-1], axis=0)
     area = np.linalg.norm(vector, axis=1)
-    number = int(component.max()) + 1
-    total = np.bincount(component, area, number)
-    extent = _extents(positions[corner_verts], component[face_of_corner], number)
+    total, number = np.bincount(component, area), len(extent)
 
     # Edges, as pairs of welded vertices; both half edges of a pair lie side by side after sorting.
     start, end = welded, welded[following]
@@ -114,16 +102,6 @@ def _welded(positions: Floats) -> Integers:
     place = np.zeros(len(order), np.int64)
     place[order] = np.cumsum(new) - 1
     return place
-
-
-def _measures(
-    positions: NDArray, corner_verts: NDArray, face_offsets: NDArray, following: NDArray, sizes: NDArray
-) -> tuple[Floats, Floats]:
-    """Area vectors and mean corners (f, 3) of faces."""
-    points = positions[corner_verts]
-    center = np.add.reduceat(points, face_offsets[:-1], axis=0) / sizes[:, None]
-    points = points - np.repeat(center, sizes, axis=0)
-    return 0.5 * np.add.reduceat(np.cross(points, points[following]), face_offsets[:-1], axis=0), center
 
 
 def _extents(points: Floats, component: NDArray, number: int) -> Floats:

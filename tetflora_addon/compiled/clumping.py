@@ -398,13 +398,6 @@ def _plants(rows: Table, first: int, polygons: Floats) -> list[Branches]:
     return [plants.take(slice(i, i + 1)) for i in range(len(plants))]
 
 
-def _directions(plant: int, plants: int) -> Floats:
-    """Directions (n, 3) on the half sphere from which one of some plants is seen, others for each."""
-    number = max(_VIEWS // plants, _LEAST_VIEWS)
-    i = plant + np.arange(number) * plants + 0.5
-    return spiral(i / (number * plants), i, GOLDEN_TURN)
-
-
 def _rays(
     things: PlantElements, groups: int, finest: float, plant: int, plants: int
 ) -> Iterator[tuple[NDArray, NDArray, NDArray]]:
@@ -426,9 +419,11 @@ def _rays(
         shape = np.maximum(np.ceil((high - corner) / side), 1).astype(np.int64)
         cells, within = np.unique(cell_numbers((things.middle - corner[:, None]) / side, shape), return_inverse=True)
         grids.append((h, side, corner, shape, cells, within.reshape(-1)))
-    directions = _directions(plant, plants)
-    segments = _SEGMENTS / (plants * len(directions))
-    for d, direction in enumerate(directions):
+    # Each plant is seen from other directions on the half sphere.
+    views = max(_VIEWS // plants, _LEAST_VIEWS)
+    i = plant + np.arange(views) * plants + 0.5
+    segments = _SEGMENTS / (plants * views)
+    for d, direction in enumerate(spiral(i / (views * plants), i, GOLDEN_TURN)):
         origin, met = _seen_along(things, direction, uniform(key, _AT + 8 * d)[0])
         shown = np.concatenate([p.shown(direction) for p in things.parts])
         pick = np.argsort(mix(key ^ np.arange(len(origin)).astype(np.uint64)), kind="stable")

@@ -200,7 +200,11 @@ def _stages(species: Species, sizes: Sizes, number: int) -> Floats:
     if ages.scaled:
         return np.tile([ages.full, 0.0, 0.0], (len(height), 1))
     if sizes.lives is None:
-        ratio = np.where(_thick(species, sizes.diameter), height / full, np.minimum(height / full, 1.0))
+        # Trunks as thick as old ones, or of a diameter that is not known.
+        trunk, old = species.orders[0], ages.diameters(ages.decline * ages.lifespan)
+        thick = sizes.diameter > 2.0 * trunk.thickness.mean * trunk.length.mean * old**0.5
+        thick |= sizes.diameter <= 0.0
+        ratio = np.where(thick, height / full, np.minimum(height / full, 1.0))
         years, older = (_class_ages(species, ratio, every) for every in (1, 2))
         gone = _SINCE[np.argmin(np.abs(np.log(np.maximum(dead, 0.1)[:, None] / _SINCE)), axis=1)]
     else:
@@ -209,13 +213,6 @@ def _stages(species: Species, sizes: Sizes, number: int) -> Floats:
         gone = np.maximum(now - _DEATHS * np.rint((now - dead) / _DEATHS), 0.01)
     died = dead > 0.0
     return np.column_stack([np.where(died, older, years), np.where(died, gone, 0.0), _crowded(species, sizes, number)])
-
-
-def _thick(species: Species, diameter: Floats) -> Mask:
-    """Which plants (n,) have trunks as thick as old ones, or of a diameter that is not known."""
-    ages, trunk = ages_of(species), species.orders[0]
-    full = 2.0 * trunk.thickness.mean * trunk.length.mean
-    return (diameter <= 0.0) | (diameter > full * ages.diameters(ages.decline * ages.lifespan) ** 0.5)
 
 
 def _crowded(species: Species, sizes: Sizes, number: int) -> Mask:

@@ -330,7 +330,10 @@ def blade_surface(blade: Blade, tolerance: float, amount: float = 1.0) -> LeafSu
     """
     step = _STEP * np.sqrt(tolerance)
     rows = max(int(np.ceil(1.0 / step)), 1)
-    columns = _columns(blade, step)
+    # Fractions of the way from the midrib to the margin at which columns of faces end, for rays a step apart.
+    number = min(int((1.0 if blade.palmate else blade.width / 2.0) / (3.0 * step)), _MOST_COLUMNS)
+    beside_midrib = [0.07] if number and step < 0.05 else []
+    columns = np.concatenate([beside_midrib, 0.85 * np.arange(1, number + 1) / number])
     flat, faces = [], []
     count, middle = 0, np.linspace(0.0, 1.0, rows + 1)
     ribs = np.stack([np.zeros(rows + 1), middle], axis=1)
@@ -350,15 +353,6 @@ def blade_surface(blade: Blade, tolerance: float, amount: float = 1.0) -> LeafSu
     scale, start = 1.0 - blade.petiole, np.array([0.0, blade.petiole, 0.0])
     made = _surface(bent * scale + start, every, places + [0.5, 0.0], error=tolerance * scale)
     return joined([made, _petiole(blade, rows)]) if blade.petiole and tolerance < 0.02 else made
-
-
-def _columns(blade: Blade, step: float) -> Floats:
-    """Fractions of the way from the midrib to the margin at which columns of faces end, for rays a step apart."""
-    wide = 1.0 if blade.palmate else blade.width / 2.0
-    number = min(int(wide / (3.0 * step)), _MOST_COLUMNS)
-    if number < 1:
-        return np.zeros(0)
-    return np.concatenate([[0.07] if step < 0.05 else [], 0.85 * np.arange(1, number + 1) / number])
 
 
 def _half(

@@ -190,19 +190,11 @@ class Spacing:
     """Keeps points apart with a grid whose cells hold one point at most.
 
     The diagonal of cells is the distance: two points of a cell are too close, and such points at most two cells apart.
-
-    Attributes
-    ----------
-    distance : float
-        Meters.
-    points : (m, 2) float64
-        Those that stand; they may crowd cells.
     """
 
     def __init__(self, distance: float, occupied: Floats) -> None:
-        self.distance = distance
-        self.cell = distance / np.sqrt(2.0)
-        self.points = occupied
+        self.distance, self.cell = distance, distance / np.sqrt(2.0)  # meters
+        self.points = occupied  # (m, 2): those that stand; they may crowd cells
 
     @property
     def free(self) -> bool:

@@ -84,7 +84,8 @@ def with_quality(species: Species, quality: float) -> Species:
     members = expected_members(species)  # in which sides and segments have no part
 
     def thinned(shapes: list[tuple[float, float]], detail: float) -> Species:
-        return _thinned(_shaped(species, shapes), members, detail)
+        tiers = [replace(o, sides=k, segments=s) for o, (k, s) in zip(_tiers(species), shapes, strict=True)]
+        return _thinned(_with_tiers(species, tiers), members, detail)
 
     # Sides and segments as real numbers make the count continuous; once they are whole, members make up for it.
     detail = _bisected(lambda d: expected_polygons(thinned(_shapes(species, members, d), d)), target)
@@ -140,12 +141,6 @@ def _shapes(species: Species, members: Members, detail: float) -> list[tuple[flo
 def _crowd(number: float) -> float:
     """0 for the trunk, 1 for the twigs of a large tree."""
     return min(math.log(max(number, 1.0)) / math.log(_MANY), 1.0)
-
-
-def _shaped(species: Species, shapes: list[tuple[float, float]]) -> Species:
-    """The species with other sides and segments."""
-    pairs = zip(_tiers(species), shapes, strict=True)
-    return _with_tiers(species, [replace(o, sides=k, segments=s) for o, (k, s) in pairs])
 
 
 def _left(number: float, detail: float, pace: float = 1.0) -> float:

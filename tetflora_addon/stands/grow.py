@@ -363,14 +363,9 @@ class SeedDispersal:
     """Seeds that fall on a site, and where they can become plants."""
 
     def __init__(self, site: StandSite, traits: StandTraits, suitability: Floats, most: float, outside: float) -> None:
-        """Of a site, for species that grow so well on its cells.
+        """Of a site, for species that grow so well on its cells (g, cells).
 
-        Parameters
-        ----------
-        most : float
-            Plants that come on a hectare and year at most.
-        outside : float
-            Factor on the seeds from outside.
+        At ``most`` so many plants come on a hectare and year; ``outside`` is a factor on the seeds from there.
         """
         self.site, self.traits, self.suitability, self.most = site, traits, suitability, most
         width, depth = site.size
@@ -525,14 +520,7 @@ def _check(settings: StandSettings) -> None:
 
 
 class GrowingStand:
-    """A stand in a year.
-
-    Attributes
-    ----------
-    plants : Plants
-        Those that live.
-    dead : DeadPlants
-    """
+    """A stand in a year: ``plants`` that live, and ``dead`` ones."""
 
     def __init__(self, site: StandSite, traits: StandTraits, settings: StandSettings) -> None:
         self.site, self.traits, self.settings = site, traits, settings

@@ -151,19 +151,7 @@ class StandSpecies:
 
 
 class StandTraits:
-    """Numbers of all species; each of `Ecology` is an array (g,) or (g, 2) here.
-
-    Attributes
-    ----------
-    first : (g,) float64
-        Girth at which a trunk is 1.3 m high, meters, or a quarter of the height that it can reach.
-    breast : (g,) float64
-        Height of that.
-    free : (g,) float64
-        Light that a free crown takes beyond what its leaves cost, for each square meter below it.
-    lifespan, mature : (g,) float64
-        Years.
-    """
+    """Numbers of all species; each of `Ecology` is an array (g,) or (g, 2) here."""
 
     def __init__(self, species: Sequence[StandSpecies]) -> None:
         if not species:
@@ -179,16 +167,20 @@ class StandTraits:
         self.planted = np.array([one.planted for one in species])
         self.incoming_seeds = np.array([one.incoming_seeds for one in species])
         ages = [ages_of(one.species) for one in species]
+        #: lifespan and mature, (g,): years.
         self.lifespan = np.array([one.lifespan for one in ages])
         self.mature = np.array([min(one.flowers, 0.5 * one.lifespan) for one in ages])
+        #: (g,): height at which trunks are measured, meters: 1.3 m, or a quarter of what they can reach.
         self.breast = np.minimum(BREAST_HEIGHT, 0.25 * self.height)
         rate, power = self.height_curve.T
         self.cost = 0.35 * self.light_compensation
+        #: (g,): light that a free crown takes beyond what its leaves cost, for each square meter below it.
         taken = -np.expm1(-self.extinction * self.leaves)
         self.free = np.round(taken - self.cost * self.extinction * self.leaves, _TRAIT_DIGITS)
         # As slender below breast height as just above it.
         near = np.minimum(_SLOPE, 0.05 * self.diameter)
         slope = (self.height - self.breast) * (-np.expm1(-rate * near)) ** power / near
+        #: (g,): girth at which trunks are as high as that, meters.
         self.first = np.round(np.clip(self.breast / slope, np.minimum(_LEAST, near), _MOST), 2 * _TRAIT_DIGITS)
         self._step = _UPTO * self.diameter / _HEIGHTS
         basal = self._step[:, None] * np.arange(_HEIGHTS + 1)

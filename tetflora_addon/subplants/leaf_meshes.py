@@ -91,7 +91,11 @@ class LeafCopies:
         """
         new = slice(self.done, self.done + len(size))
         self.done = new.stop
-        shape = self.shapes if isinstance(self.of, LeafModel) else self._chosen(key, new)
+        if isinstance(self.of, LeafKites):
+            self._variant[new] = self.of.chosen(uniform(key, Draw.LEAF_PLANE))
+        elif isinstance(self.of, LeafLevel):
+            self._variant[new] = uniform(key, Draw.LEAF_VARIANT) * self.shapes.shape[2]
+        shape = self.shapes if isinstance(self.of, LeafModel) else self.shapes[:, :, self._variant[new]]
         self.positions[new] = _placed(shape, position, frame, size)
         if motion is not None:
             self.velocity[new] = _placed(shape, *motion, size)
@@ -104,14 +108,6 @@ class LeafCopies:
         reach = float(np.linalg.norm(corners - middle, axis=1).max())
         middle = sum(frame[:, :, axis] * np.float32(middle[axis]) for axis in range(3))
         return position + size[:, None] * middle, reach * size
-
-    def _chosen(self, key: Keys, new: slice) -> Floats32:
-        """Vertices (v, 3, n) of copies with keys (n,) before they are placed."""
-        if isinstance(self.of, LeafKites):
-            self._variant[new] = self.of.chosen(uniform(key, Draw.LEAF_PLANE))
-        else:
-            self._variant[new] = uniform(key, Draw.LEAF_VARIANT) * self.shapes.shape[2]
-        return self.shapes[:, :, self._variant[new]]
 
     def buffers(self) -> MeshBuffers:
         """The mesh, once all copies are placed."""
@@ -130,24 +126,22 @@ class LeafCopies:
         else:
             uv = _stepped(uv.reshape(-1), 0, n)
             index = None if index is None else _stepped(index, 0, n)
-        materials = {} if index is None else {"material_index": ("FACE", index)}
-        motion = {} if self.velocity is None else {"velocity": ("POINT", self.velocity[:n].reshape(-1, 3))}
         faces = n * model.polygons
-        dull = {"tf_dull": ("FACE", np.full(faces, self.dull, np.float32))} if self.dull else {}
+        attributes = {"UVMap": ("CORNER", uv.reshape(-1, 2)), "tf_color": ("FACE", self.color[:n].reshape(-1, 3))}
+        attributes["tf_transmission"] = "FACE", np.full(faces, self.transmission, np.float32)
+        if self.dull:
+            attributes["tf_dull"] = "FACE", np.full(faces, self.dull, np.float32)
+        if index is not None:
+            attributes["material_index"] = "FACE", index
+        if self.velocity is not None:
+            attributes["velocity"] = "POINT", self.velocity[:n].reshape(-1, 3)
         return MeshBuffers(
             positions=self.positions[:n].reshape(-1, 3),
             edge_verts=_stepped(edges.reshape(-1), vertices, n).reshape(-1, 2),
             corner_verts=_stepped(model.corner_verts, vertices, n),
             corner_edges=_stepped(edge_of_corner, len(edges), n),
             face_offsets=np.append(starts, np.int32(n * corners)),
-            attributes={
-                "UVMap": ("CORNER", uv.reshape(-1, 2)),
-                "tf_color": ("FACE", self.color[:n].reshape(-1, 3)),
-                "tf_transmission": ("FACE", np.full(faces, self.transmission, np.float32)),
-                **dull,
-                **materials,
-                **motion,
-            },
+            attributes=attributes,
             smooth=level or (model.closed and not model.textured),  # fruit and fleshy leaves are round
         )
 

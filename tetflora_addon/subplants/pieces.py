@@ -71,18 +71,12 @@ def piece_leaf_integrals(flora: Flora, pieces: Pieces) -> tuple[Floats, Floats, 
 def piece_leaf_colors(flora: Flora, pieces: Pieces) -> Floats:
     """Mean linear RGB (n, 3) of the leaves that branches themselves bear on pieces, weighted by area."""
     row, rows = pieces.branches.row, flora.rows
-    color = _summer_colors(flora, pieces)
+    inside = color = rows["leaf_color"][row, 0]
+    if rows["gradient"].any():
+        area, area_outward, area_young = piece_leaf_integrals(flora, pieces)
+        older = inside + (rows["leaf_color_tip"][row] - inside) * (area_outward / area)[:, None]
+        color = older + (rows["leaf_color_young"][row] - inside) * (area_young / area)[:, None]
     return color if flora.day is None else flora.day.own_colors(pieces.branches, rows["leaf_kind"][row], color)
-
-
-def _summer_colors(flora: Flora, pieces: Pieces) -> Floats:
-    row, rows = pieces.branches.row, flora.rows
-    inside = rows["leaf_color"][row, 0]
-    if not rows["gradient"].any():
-        return inside
-    area, area_outward, area_young = piece_leaf_integrals(flora, pieces)
-    older = inside + (rows["leaf_color_tip"][row] - inside) * (area_outward / area)[:, None]
-    return older + (rows["leaf_color_young"][row] - inside) * (area_young / area)[:, None]
 
 
 def wood_areas(flora: Flora, pieces: Pieces) -> Floats:
