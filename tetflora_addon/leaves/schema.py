@@ -49,11 +49,11 @@ def _read_leaf(reader: FileReader, data: Any, where: str) -> LeafModel | str:
             raise reader.fail(
                 f"{where}.outline", "must be left out where the leaf is an object, which is drawn as it is"
             )
-        shape = read_outline(reader, data["outline"], f"{where}.outline")
+        shape = _read_outline(reader, data["outline"], f"{where}.outline")
         rest = {key: value for key, value in data.items() if key != "outline"}
         if not forms:
             reader.keys(rest, where, ())
-            return outlined_model(shape)
+            return _outlined_model(shape)
         return replace(_read_leaf(reader, rest, where), shape=shape)
     if "model" in data:
         if not isinstance(data["model"], str) or data["model"] not in LEAF_MODELS:
@@ -90,14 +90,8 @@ def _is_list_of_points(value: Any, size: int) -> bool:
     )
 
 
-def read_outline(reader: FileReader, data: Any, where: str) -> Blade | Needles | Compound:
-    """An outline from what a species file has for it.
-
-    Raises
-    ------
-    SpeciesError
-        Names the field and what it may be.
-    """
+def _read_outline(reader: FileReader, data: Any, where: str) -> Blade | Needles | Compound:
+    """An outline from what a species file has for it."""
     kind = "blade"
     if isinstance(data, dict) and "kind" in data:
         kind = reader.choice(data["kind"], f"{where}.kind", tuple(OUTLINES))
@@ -117,15 +111,14 @@ def read_outline(reader: FileReader, data: Any, where: str) -> Blade | Needles |
 
 
 def _read_leaflet(reader: FileReader, data: Any, where: str) -> Blade:
-    made = read_outline(reader, data, where)
+    made = _read_outline(reader, data, where)
     if not isinstance(made, Blade):
         raise reader.fail(f"{where}.kind", "must be blade, because leaflets are simple")
     return made
 
 
-def outlined_model(shape: Blade | Needles | Compound) -> LeafModel:
+def _outlined_model(shape: Blade | Needles | Compound) -> LeafModel:
     """The coarsest level of an outline that has no other: few faces, which show as much as the outline."""
     made = fitted(shape, TOLERANCES[0], shown_area(shape, surface_of(shape, TOLERANCES[2], 0.0)), amount=0.0)
-    return LeafModel(
-        np.round(made.positions[0], 6), made.corner_verts, made.face_offsets, made.uv.astype(np.float32), shape=shape
-    )
+    positions, uv = np.round(made.positions[0], 6), made.uv.astype(np.float32)
+    return LeafModel(positions, made.corner_verts, made.face_offsets, uv, shape=shape)

@@ -163,11 +163,9 @@ _SPREAD = 1.1  # exponent of the fall (Freeman 1991): flow down a cone is even a
 _AROUND = tuple((i, j, float(np.hypot(i, j))) for i in (-1, 0, 1) for j in (-1, 0, 1) if i or j)
 
 
-def filled(height: Floats, cell: float) -> Floats:
+def _filled(height: Floats, cell: float) -> Floats:
     """Ground (h, w) without hollows, meters: each cell falls toward the border or toward NaN, from where water leaves.
 
-    Notes
-    -----
     All is flooded, and the flood sinks until each cell is as high as its ground, or a hair above its lowest neighbor.
     Rows are swept to and fro, then columns; the result does not depend on that.
     """
@@ -201,13 +199,11 @@ def _sweep(water: Floats, ground: Floats, lines: range, before: int, cell: float
         np.minimum(own, np.maximum(lowest, ground[line, 1:-1]), out=own)
 
 
-def catchment(surface: Floats, cell: float) -> Floats:
+def _catchment(surface: Floats, cell: float) -> Floats:
     """Area that is uphill of each cell of a surface (h, w), with its own, (h, w) in m²; NaN where there is no ground.
 
     Cells without a lower neighbor are outlets. All of the area arrives at these.
 
-    Notes
-    -----
     A cell is done when all that flow into it are: as many rounds as the longest way of water has cells, each with only
     the cells that it finishes. What arrives is summed in the order of neighbors, so the result is the same anywhere.
     """
@@ -258,11 +254,8 @@ def topographic_index(height: Floats, cell: float) -> Floats:
 
     The larger of two: hollows keep what runs into them, and hollows are full and flow over.
     """
-    index = [
-        catchment(surface, cell) / cell / np.maximum(steepness(surface, cell), _LEVEL)
-        for surface in (height, filled(height, cell))
-    ]
-    return np.log(np.maximum(*index))
+    surfaces = height, _filled(height, cell)
+    return np.log(np.maximum(*(_catchment(s, cell) / cell / np.maximum(steepness(s, cell), _LEVEL) for s in surfaces)))
 
 
 def wetness(height: Floats, cell: float) -> Floats:

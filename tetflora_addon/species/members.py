@@ -73,18 +73,7 @@ def _laterals(order: Order) -> tuple[Floats, Floats, Floats | float]:
         at = np.clip(law.place_of(node) / own.now, 0, 1)
         fraction = nodes.kept * (node - base) / max(tip - base, 1e-9)
         shorter = faded(fraction, nodes.kept * (1 - nodes.fresh), extra) * shortened(fraction, own.conical, *own.ramps)
-    return at, shorter * _ratios(order, fraction), weight
-
-
-@lru_cache
-def _even_ratios(profile: str) -> Floats:
-    return crown_ratio(profile, 1 - EVEN)
-
-
-def _ratios(order: Order, fraction: Floats) -> Floats:
-    if fraction is EVEN:  # of all that are full-grown, again and again
-        return _even_ratios(order.crown)
-    return crown_ratio(order.crown, 1 - fraction)
+    return at, shorter * crown_ratio(order.crown, 1 - fraction), weight
 
 
 def least_length(order: Order) -> float:
@@ -92,7 +81,7 @@ def least_length(order: Order) -> float:
     if order.growing is None:
         return 0.0
     fraction = np.linspace(0, 1, 65)
-    return float((_ratios(order, fraction) * (1 - order.growing.conical * fraction)).min())
+    return float((crown_ratio(order.crown, 1 - fraction) * (1 - order.growing.conical * fraction)).min())
 
 
 @lru_cache(maxsize=256)

@@ -318,10 +318,18 @@ LEAF_ENVELOPES = ("none", "sphere", "cylinder", "cone", "box")
 """Solids around a branch that leaves may fill."""
 LEAF_INCLINATIONS = ("branch", "spherical", "planophile", "erectophile", "plagiophile", "extremophile", "uniform")
 """How leaves stand: as the branch has it, or by a distribution of the angle between their normals and its axis."""
-CROWN_PROFILES = (
-    "conical", "spherical", "hemispherical", "cylindrical", "tapered", "flame", "inverse conical", "tend flame",
-    "receding",
-)  # fmt: skip
+_RATIOS = {
+    "conical": lambda r: 0.2 + 0.8 * r,
+    "spherical": lambda r: 0.2 + 0.8 * np.sin(np.pi * r),
+    "hemispherical": lambda r: 0.2 + 0.8 * np.sin(0.5 * np.pi * r),
+    "cylindrical": np.ones_like,
+    "tapered": lambda r: 0.5 + 0.5 * r,
+    "flame": lambda r: np.maximum(np.where(r <= 0.7, r / 0.7, (1 - r) / 0.3), 0.05),
+    "inverse conical": lambda r: 1 - 0.8 * r,
+    "tend flame": lambda r: np.where(r <= 0.7, 0.5 + 0.5 * r / 0.7, 0.5 + 0.5 * (1 - r) / 0.3),
+    "receding": lambda r: 0.4 + 0.6 * r,
+}
+CROWN_PROFILES = tuple(_RATIOS)
 """Names of the shapes, in the order of their numbers (Weber and Penn, SIGGRAPH 1995, section 4.3), and one more."""
 BARKS = (
     "ridged", "plated", "smooth", "banded", "ringed", "fibrous", "jointed", "netted", "peeling", "scaly",
@@ -534,17 +542,6 @@ def crown_ratio(shape: Integers | str, r: Floats) -> Floats:
     0.05, so that no branch has zero length.
     """
     r = np.clip(r, 0.0, 1.0)
-    return np.choose(
-        CROWN_PROFILES.index(shape) if isinstance(shape, str) else shape,
-        [
-            0.2 + 0.8 * r,
-            0.2 + 0.8 * np.sin(np.pi * r),
-            0.2 + 0.8 * np.sin(0.5 * np.pi * r),
-            np.ones_like(r),
-            0.5 + 0.5 * r,
-            np.maximum(np.where(r <= 0.7, r / 0.7, (1 - r) / 0.3), 0.05),
-            1 - 0.8 * r,
-            np.where(r <= 0.7, 0.5 + 0.5 * r / 0.7, 0.5 + 0.5 * (1 - r) / 0.3),
-            0.4 + 0.6 * r,
-        ],
-    )
+    if isinstance(shape, str):
+        return _RATIOS[shape](r)
+    return np.choose(shape, [ratio(r) for ratio in _RATIOS.values()])

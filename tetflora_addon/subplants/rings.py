@@ -212,11 +212,12 @@ def rings_of(flora: Flora, whole: WholeBranches) -> Rings:
     return Rings(branches, owner, t, center, radius * _ring_axes(whole.lines, owner, t), _goes_on(owner), later)
 
 
-def fine_numbers(flora: Flora, whole: WholeBranches, counts: Integers) -> tuple[Integers, Integers]:
-    """Rings of each branch (n,), and of its roots, of which each has `PLACES`."""
-    footed = has_foot(flora.rows, whole.branches)
-    rings = counts.sum(axis=1) + 1 + below_base(flora.rows, whole.branches) + beyond_tip(flora.rows, whole.branches)
-    return rings, np.where(footed, PLACES * root_number(whole.branches.key), 0)
+def ring_sums(flora: Flora, whole: WholeBranches, counts: Integers) -> tuple[Integers, tuple[Integers, Integers]]:
+    """Rings of each branch (n,), and of what `BESIDES` makes of it (n,), (n,)."""
+    rows, branches = flora.rows, whole.branches
+    rings = counts.sum(axis=1) + 1 + below_base(rows, branches) + beyond_tip(rows, branches)
+    roots = np.where(has_foot(rows, branches), PLACES * root_number(branches.key), 0)
+    return rings, (roots, bud_numbers(flora, whole))
 
 
 def fine_counts(flora: Flora, whole: WholeBranches, fine: Fineness, pixels: Pixels) -> Integers:
@@ -609,6 +610,10 @@ def bud_rings(flora: Flora, whole: WholeBranches, fine: Fineness) -> tuple[Rings
     goes_on = np.tile(np.arange(BUD_RINGS) < BUD_RINGS - 1, len(owner))
     rings = Rings(wood, bud, np.tile(_ALONG, len(owner)), center, reach, goes_on, later, None, color[species])
     return rings, owner
+
+
+#: What there is beside the tubes of near branches: how it is made, sides by those of a tube, and rings of each one.
+BESIDES = ((foot_rings, root_sides, PLACES), (bud_rings, bud_sides, BUD_RINGS))
 
 
 def _places(flora: Flora, whole: WholeBranches) -> tuple[Integers, Integers, Keys]:

@@ -23,24 +23,7 @@ from ..growth.seasons import branch_colors
 from ..growth.seeds import Branches
 from ..growth.wind import moment
 from .pieces import Pieces, wood_areas
-from .rings import (
-    BUD_RINGS,
-    PLACES,
-    Fineness,
-    Pixels,
-    Rings,
-    bud_numbers,
-    bud_rings,
-    bud_sides,
-    fine_counts,
-    fine_numbers,
-    fine_rings,
-    fineness,
-    foot_rings,
-    keep_inside,
-    rings_of,
-    root_sides,
-)
+from .rings import BESIDES, Fineness, Pixels, Rings, fine_counts, fine_rings, fineness, keep_inside, ring_sums, rings_of
 
 #: Rings that are worked on at a time: some ten megabytes.
 _RING_BATCH = 48_000
@@ -86,26 +69,22 @@ def tube_faces(flora: Flora, whole: WholeBranches, pixels: Pixels | None = None)
 class _TubeGroup:
     """Branches (n,) of one number of sides.
 
-    ``rings`` (n,) are those of tubes, ``beside`` (n,) those of roots, `PLACES` to each, ``buds`` (n,) those of buds,
-    `BUD_RINGS` to each. Where branches are more than coarse tubes, ``counts`` (n, S) are parts of their segments.
+    ``rings`` (n,) are those of tubes. Where branches are more than coarse tubes, ``beside`` are the rings (n,) of each
+    of `BESIDES`, and ``counts`` (n, S) are parts of their segments.
     """
 
     whole: WholeBranches
     sides: int
     rings: Integers
-    beside: Integers | None = None
+    beside: tuple[Integers, ...] = ()
     fine: Fineness | None = None
     counts: Integers | None = None
-    buds: Integers | None = None
 
     def numbers(self) -> tuple[int, int]:
         """Vertices and faces."""
         vertices, faces = self.sides * int(self.rings.sum()), self.sides * int((self.rings - 1).sum())
-        if self.beside is None:
-            return vertices, faces
-        kinds = (self.beside, root_sides(self.sides), PLACES), (self.buds, int(bud_sides(self.sides)), BUD_RINGS)
-        for number, sides, each in kinds:
-            rings = int(number.sum())
+        for number, (_, sides_of, each) in zip(self.beside, BESIDES, strict=False):
+            rings, sides = int(number.sum()), int(sides_of(self.sides))
             vertices, faces = vertices + sides * rings, faces + sides * (rings - rings // each)
         return vertices, faces
 
@@ -118,9 +97,9 @@ class _TubeGroup:
         for some in chunks(self.rings * self.sides, 8 * _RING_BATCH):
             whole, fine = self.whole.take(some), self.fine.take(some)
             yield fine_rings(flora, whole, fine, self.counts[some]), self.sides, whole
-            for besides, sides in ((foot_rings, root_sides), (bud_rings, bud_sides)):
-                if (found := besides(flora, whole, fine)) is not None:
-                    yield found[0], int(sides(self.sides)), whole.take(found[1])
+            for rings_beside, sides_of, _ in BESIDES:
+                if (found := rings_beside(flora, whole, fine)) is not None:
+                    yield found[0], int(sides_of(self.sides)), whole.take(found[1])
 
 
 def _sorts(
@@ -143,7 +122,7 @@ def _sorts(
         own = near[fine.sides[near] == k]
         some, how = whole.take(own), fine.take(own)
         counts = fine_counts(flora, some, how, pixels)
-        yield _TubeGroup(some, int(k), *fine_numbers(flora, some, counts), how, counts, bud_numbers(flora, some))
+        yield _TubeGroup(some, int(k), *ring_sums(flora, some, counts), how, counts)
 
 
 class _Tubes:

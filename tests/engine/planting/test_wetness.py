@@ -73,7 +73,7 @@ def _bumps(seed: int, rows: int = 24, columns: int = 31) -> np.ndarray:
 def test_no_water_is_lost(seed):
     """Filled ground has no hollows, is never lower, and what falls on it arrives at outlets."""
     height = _bumps(seed)
-    surface = wet.filled(height, 2.0)
+    surface = wet._filled(height, 2.0)
     there = ~np.isnan(height)
     assert (np.isnan(surface) == ~there).all() and (surface[there] >= height[there]).all()
     around = np.pad(surface, 1, constant_values=-np.inf)
@@ -81,7 +81,7 @@ def test_no_water_is_lost(seed):
     rows, columns = height.shape
     others = [around[1 + i : 1 + i + rows, 1 + j : 1 + j + columns] for i, j, _ in wet._AROUND]
     assert (np.min(others, axis=0)[there] < surface[there]).all(), "each cell has a lower neighbor or a border"
-    area = wet.catchment(surface, 2.0)
+    area = wet._catchment(surface, 2.0)
     inner = [np.where(np.isneginf(o), np.inf, o) for o in others]
     outlets = there & ~(np.min(inner, axis=0) < surface)
     assert area[outlets].sum() == pytest.approx(4.0 * there.sum())
@@ -91,7 +91,7 @@ def test_no_water_is_lost(seed):
 def test_a_plane_gathers_by_its_length():
     """What is uphill of a meter of width is the distance from the top."""
     _, y = _middles(40, 60, 2.0)
-    area = wet.catchment(wet.filled(-0.2 * y, 2.0), 2.0)
+    area = wet._catchment(wet._filled(-0.2 * y, 2.0), 2.0)
     assert np.allclose(area[:, 25:35] / 2.0, (2.0 * np.arange(1, 41))[:, None], rtol=0.05)
     assert np.allclose(wet.steepness(-0.2 * y, 2.0), 0.2)
 
@@ -100,7 +100,7 @@ def test_a_cone_sheds_evenly():
     """Uphill of a meter at the radius r are π r² of its top over 2 π r, all around."""
     x, y = _middles(81, 81, 1.0)
     radius = np.hypot(x - 40.5, y - 40.5)
-    area = wet.catchment(-0.3 * radius, 1.0)
+    area = wet._catchment(-0.3 * radius, 1.0)
     ring = (radius > 24.0) & (radius < 32.0)
     ratio = area[ring] / (0.5 * radius[ring])
     assert 0.9 < ratio.mean() < 1.35 and ratio.std() / ratio.mean() < 0.2
