@@ -57,7 +57,7 @@ class AssetCosts:
         """Whether all instances are best left as they are, with so many bytes left."""
         if not cycles:
             return bool((self.triangles * self.instances).sum() <= EEVEE_FEW)
-        return bool(self._loaded.sum() + self._of_instances.sum() <= SAFE * left)
+        return bool(self._bytes.sum() <= SAFE * left)
 
     def originals(self, cycles: bool, left: float, always: bool = True) -> OriginalPolicy:
         """How instances are drawn that are refined: because not all can be the originals, or whatever it costs.
@@ -70,7 +70,7 @@ class AssetCosts:
         if not always and self.plain(cycles, left):
             return OriginalPolicy(kept, CYCLES_WHOLE, shared=True, kites=False)
         # Those that cover most for what they take; none but these is loaded at all.
-        cost = self._loaded + self._of_instances
+        cost = self._bytes
         if always:
             order = np.argsort(-self.pixels / np.maximum(cost, 1.0), kind="stable")
             room = SAFE / 2 * left
@@ -80,9 +80,5 @@ class AssetCosts:
         return OriginalPolicy(kept, NEVER, shared=True)
 
     @property
-    def _loaded(self) -> Floats:
-        return CYCLES_TRIANGLE * self.triangles
-
-    @property
-    def _of_instances(self) -> Floats:
-        return (CYCLES_INSTANCE + BLENDER_INSTANCE) * self.instances
+    def _bytes(self) -> Floats:
+        return CYCLES_TRIANGLE * self.triangles + (CYCLES_INSTANCE + BLENDER_INSTANCE) * self.instances

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from ..arrays import Arrays, Floats, Floats32, Integers, Integers32, Mask, chunks, column, spread, unit
 from ..buffers import MeshBuffers, separate_polygons
-from ..growth.hashing import child_key, key_of_seed, uniform
+from ..growth.hashing import GOLDEN, child_key, key_of_seed, uniform
 from .asset import AssetKites, AssetSource, SurfaceSamples
 from .patches import Hierarchy, Patches
 
@@ -43,7 +43,6 @@ _SHEET_TRANSMISSION = 0.3
 _ROUGHNESS = 0.5
 #: Draws of the places of samples.
 ALONG, _U, _V = 241, 242, 243
-_GOLDEN = (np.sqrt(5.0) - 1.0) / 2.0
 #: Islands of solids that are a larger part of all faces' area than this are wood; others are as many as leaves.
 _WOOD = 1.0 / 256.0
 #: Wood of more than this fraction of the largest width is thick.
@@ -249,9 +248,8 @@ def shared_out(leaf: Floats, wood: Floats, number: int) -> Integers:
 def well_spread(counts: Integers) -> tuple[Integers, Integers]:
     """Owner (m,) and place (m,) of so many things each, in an order in which any run is spread over all of an owner."""
     owner, index = spread(counts)
-    place = np.lexsort([index * _GOLDEN % 1.0, owner])
     rank = np.empty(len(owner), np.int64)
-    rank[place] = index  # of the owner's things by golden section
+    rank[np.lexsort([index * GOLDEN % 1.0, owner])] = index  # of the owner's things by golden section
     return owner, rank
 
 

@@ -33,7 +33,6 @@ _LEAVES = 4  # on each of them,
 _INCLINED = 32  # or so many that stand all around by chance
 _SORTS = (LATERAL, FORK, SPUR, DEAD)
 _ALONG, _CHILD = 111, 112  # draws of this module, beyond those of growth
-_UP = np.array([0.0, 0.0, 1.0])
 # Exponents of x, y, z: all polynomials of degree 4 on the sphere are sums of these.
 _EXPONENTS = np.array([(a, b, d - a - b) for d in (3, 4) for a in range(d + 1) for b in range(d + 1 - a)])
 _TERMS = len(_EXPONENTS) + 8
@@ -298,7 +297,7 @@ def _own_leaves(rows: Table, branches: Branches, lines: Axes, turn: Floats, plac
     frame = foliage.leaf_frames(rows, row, along.astype(np.float32), roll, index, key)
     outward = foliage.outwardness(rows, branches, owner, t)
     light = foliage.leaf_lights(rows, row, key, outward if place is None else np.full(len(t), place))
-    frame = foliage.settled(rows, row, frame, light, _UP)
+    frame = foliage.settled(rows, row, frame, light, foliage.SKY)
     weight = number * (foliage.leaf_sizes(rows, row, key, outward, t) * branches.scale[owner]) ** 2
     # F T Fᵀ, summed over the leaves of each branch: their frames side by side.
     left = _product(frame.reshape(-1, 3).astype(np.float64), turn).reshape(-1, 3, 3) * weight[:, None, None]

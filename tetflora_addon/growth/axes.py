@@ -188,8 +188,7 @@ def _pulled(frame: Floats, pull: Floats, sky: Floats | None = None) -> Floats:
     return out
 
 
-FLARE_END = 1 / 8
-_FALL = 8 * np.log(100.0)  # the flare falls to a hundredth over the first eighth
+FLARE_END, FLARE_FALL = 1 / 8, 8 * np.log(100.0)  # the flare falls to a hundredth over the first eighth
 
 
 def profile(rows: Table, row: NDArray, key: Keys, t: Floats, summed: bool = False) -> NDArray:
@@ -213,8 +212,8 @@ def profile(rows: Table, row: NDArray, key: Keys, t: Floats, summed: bool = Fals
     flared = np.flatnonzero(rows["flare"][row] > 0)
     if len(flared):
         end = np.minimum(t[flared], FLARE_END) if summed else t[flared]
-        fall = np.exp(-_FALL * end)
-        more = (1 - fall) / _FALL - 0.01 * end if summed else np.maximum(fall - 0.01, 0)
+        fall = np.exp(-FLARE_FALL * end)
+        more = (1 - fall) / FLARE_FALL - 0.01 * end if summed else np.maximum(fall - 0.01, 0)
         out[flared] += rows["flare"][row[flared]] * more
     return out
 

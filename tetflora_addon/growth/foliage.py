@@ -132,7 +132,7 @@ def _inclined(frame: Floats32, kind: Integers, key: Keys) -> Floats32:
 
 
 _LEAF_PATH = 1 << 32  # child indices of leaves start here, so that they never meet those of branches
-_SKY = np.array([0.0, 0.0, 1.0])
+SKY = np.array([0.0, 0.0, 1.0])  # where it is without wind
 YOUTH = 4
 """Power of the place along a branch by which leaves are young."""
 _PLACE_JITTER = 0.4  # below a half, so that leaves keep their order along the branch
@@ -266,7 +266,7 @@ def place_leaves(
     if solid.any():  # from the middle to the base
         position -= (0.5 * size * solid)[:, None] * frame[:, :, 1]
     light = leaf_lights(rows, row, key, outward)
-    return Leaves(owner, key, position, frame, size, light, _SKY if sky is None else sky, stages)
+    return Leaves(owner, key, position, frame, size, light, SKY if sky is None else sky, stages)
 
 
 def leaf_frames(

@@ -26,7 +26,6 @@ from .wind import axis_and_angle, is_windy, moment, turned_by, turned_vectors
 _PLACE_JITTER = 0.5  # of the distance from one child to the next: together children lie evenly along the whole parent
 # Each sort of children has child indices of its own, below those of leaves.
 _PATHS = np.array([0, 1 << 30, 1 << 31, 3 << 30])
-_SKY = np.array([0.0, 0.0, 1.0])
 _DRAWN_PATH = 1 << 29
 _COUNT = (Draw.BRANCHES, Draw.FORKS, Draw.SPURS, Draw.DEAD)
 _ROUND = (Draw.BRANCHES_ROUND, Draw.FORKS_ROUND, Draw.SPURS_ROUND, Draw.DEAD_ROUND)
@@ -72,7 +71,7 @@ def trunks(rows: Table, seeds: Seeds) -> Branches:
     plant = np.arange(len(seeds), dtype=np.int32)
     scale = np.asarray(seeds.scale, dtype=np.float64)
     one, none = np.ones(len(seeds)), np.zeros(len(seeds))
-    sky = by_component(np.tile(_SKY, (len(seeds), 1))) if is_windy(rows) else None
+    sky = by_component(np.tile([0.0, 0.0, 1.0], (len(seeds), 1))) if is_windy(rows) else None
     later = _later(seeds, frame, sky, moment(rows)) if moment(rows) else None
     year, crown = plant_years(rows, row, key), None
     if seeds.crown is not None:

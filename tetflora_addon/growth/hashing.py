@@ -105,8 +105,8 @@ def signed(key: Keys, draw: int) -> Floats:
     return out
 
 
-# Multiples of it, less the whole part, are spread evenly, any run of them: the golden section.
-_STEP = (np.sqrt(5) - 1) / 2
+#: Multiples of it, less the whole part, are spread evenly, any run of them: the golden section.
+GOLDEN = (np.sqrt(5) - 1) / 2
 _THIN = 201  # a draw of this module, beyond those of growth and samples
 
 
@@ -148,7 +148,7 @@ def systematic(weights: Floats, group: Integers, sort: Floats, numbers: Integers
     low, high = edges[bounds[:-1]], edges[bounds[1:]]
     low, high = np.where(high > low, [low, high], [[0.0], [edges[-1]]])
     of = np.repeat(np.arange(len(numbers)), numbers)
-    place = {number: np.argsort(np.argsort(np.arange(number) * _STEP % 1.0)) for number in set(numbers.tolist())}
+    place = {number: np.argsort(np.argsort(np.arange(number) * GOLDEN % 1.0)) for number in set(numbers.tolist())}
     fraction = (np.concatenate([place[number] for number in numbers.tolist()]) + 0.5) / numbers[of]
     at = low[of] + (high - low)[of] * fraction
     return order[np.minimum(np.searchsorted(edges[1:], at, side="right"), len(order) - 1)]

@@ -185,8 +185,7 @@ def needle_ratio(model: LeafModel) -> float:
         return 1.0
     made = fitted(model.shape, TOLERANCES[-1], model.area, model.reach)
     faces = np.linalg.norm(_model_of(made).face_vectors, axis=1) * np.where(made.solid, 0.5, 1.0)
-    scales = _recollision(model.shape, made) > _SCALES
-    return 1.0 if scales else float(faces[~_stems(made)].sum()) / model.area
+    return 1.0 if _recollision(model.shape, made) > _SCALES else float(faces[~_stems(made)].sum()) / model.area
 
 
 @lru_cache(maxsize=128)

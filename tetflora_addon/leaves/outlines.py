@@ -14,13 +14,14 @@ import numpy as np
 from ..arrays import Floats, Integers
 from ..parameters import limited, named
 
-#: Exponents p and q of the half width 1 - (1 - u)^p, to the power of q, on the way from the end to the widest place.
+#: Exponents p and q of the half width 1 - (1 - u)^p, to the power of q, on the way from the end to the widest place. Of
+#: bases, besides, how far palmate ones reach behind their last lobe, 0 to 1.
 BASES = {
-    "attenuate": (2.0, 1.7),
-    "cuneate": (2.0, 1.0),
-    "rounded": (2.0, 0.55),
-    "truncate": (4.0, 0.5),
-    "cordate": (3.0, 0.5),
+    "attenuate": (2.0, 1.7, 0.1),
+    "cuneate": (2.0, 1.0, 0.15),
+    "rounded": (2.0, 0.55, 0.2),
+    "truncate": (4.0, 0.5, 0.25),
+    "cordate": (3.0, 0.5, 0.7),
 }
 APEXES = {
     "rounded": (2.4, 0.5),
@@ -126,7 +127,7 @@ class Blade:
 
     def envelope(self, y: Floats) -> Floats:
         """Half widths (n,) of the blade without lobes and teeth at heights y (n,)."""
-        (p, q), (r, t) = BASES[self.base], APEXES[self.apex]
+        (p, q, _), (r, t) = BASES[self.base], APEXES[self.apex]
         low = np.clip(y / self.widest, 0.0, 1.0)
         high = np.clip((1.0 - y) / (1.0 - self.widest), 0.0, 1.0)
         lower, upper = (1.0 - (1.0 - low) ** p) ** q, (1.0 - (1.0 - high) ** r) ** t
@@ -159,8 +160,7 @@ class Blade:
     def _most_angle(self) -> float:
         """Angle between the midrib and the base of a palmate margin."""
         tips, _ = self._palm()
-        behind = {"attenuate": 0.1, "cuneate": 0.15, "rounded": 0.2, "truncate": 0.25, "cordate": 0.7}[self.base]
-        return float(tips[-1] + (np.pi * 0.94 - tips[-1]) * behind)
+        return float(tips[-1] + (np.pi * 0.94 - tips[-1]) * BASES[self.base][2])
 
     def _palm(self) -> tuple[Floats, Floats]:
         """Angles from the midrib and lengths of the lobes of one half of a palmate blade, that of the tip first."""

@@ -191,9 +191,8 @@ def place(
         older_species = np.full(len(older), -1, np.int32)
     site = Site(ground, rules, zones)
     key = key_of_seed(rules.seed)
-    spacing = Spacing(rules.min_distance, older)
     company = Company(rules, older, older_species)
-    sowing = _Sowing(site, rules, spacing, company, suits or {})
+    sowing = _Sowing(site, rules, Spacing(rules.min_distance, older), company, suits or {})
     if not company.rules and not suits:
         sowing.sow(key, None, 1.0)
     else:

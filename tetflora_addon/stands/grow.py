@@ -351,10 +351,7 @@ def planted(site: StandSite, traits: StandTraits, suitability: Floats, density: 
     species = np.minimum(np.searchsorted(limits, uniform(key, StandDraw.SPECIES), side="right"), len(limits) - 1)
     cells = site.cells(x, y)
     quality = suitability[species, cells]
-    there = quality > 0.0
-    if site.plantable is not None:
-        there &= uniform(key, StandDraw.PLANTABLE) < site.plantable.ravel()[cells]
-    kept = np.flatnonzero(there)
+    kept = np.flatnonzero((quality > 0.0) & (uniform(key, StandDraw.PLANTABLE) < site.plantable.ravel()[cells]))
     basal = _PLANTED_DIAMETER * traits.first[species]
     return newcomers(key[kept], 0, species[kept], x[kept], y[kept], basal[kept], quality[kept], _PLANTED_AGE, traits)
 
@@ -417,9 +414,7 @@ class SeedDispersal:
         lit = np.clip((ground[None, :] - least) / (3.0 * least), 0.0, 1.0)
         able = seeds * lit * self.suitability[:, here]
         total = able.sum(axis=0)
-        chance = total / (total + _HALF)
-        if site.plantable is not None:
-            chance *= site.plantable.ravel()[here]
+        chance = total / (total + _HALF) * site.plantable.ravel()[here]
         kept = np.flatnonzero(come < chance)
         limits = np.cumsum(able[:, kept], axis=0)
         species = (uniform(key[kept], StandDraw.SPECIES) * total[kept] >= limits).sum(axis=0)

@@ -40,10 +40,11 @@ class StandSite:
     south: float
     cell: float  # side of a cell, meters
     height: NDArray  # (h, w): altitude, meters
-    #: (h, w): fraction of the ground where plants can be, 0 to 1; everywhere where it is None.
-    plantable: NDArray | None = None
-    moisture: NDArray | None = None  # (h, w): 0 dry to 1 wet; 0.5, fresh, where it is None
-    fertility: NDArray | None = None  # (h, w): 0 poor to 1 rich; 0.7 where it is None
+    #: plantable, moisture and fertility, (h, w) or one number for all: fraction of the ground where plants can be, 0 to
+    #: 1; from 0, dry, to 1, wet; and from 0, poor, to 1, rich.
+    plantable: NDArray | float = 1.0
+    moisture: NDArray | float = 0.5
+    fertility: NDArray | float = 0.7
     #: Sum of daily mean temperatures over 5 °C in a year (growing degree days), at height 0; 0.6 K colder each 100 m.
     degree_days: float = 1700.0
     coldest_month: float = -1.0  # mean temperature of the coldest month there, °C
@@ -61,10 +62,8 @@ class StandSite:
         if np.ndim(self.height) != 2 or not np.size(self.height):
             raise TetFloraError("The ground of a site must have rows and columns; choose a ground with some area")
         for name in ("height", "plantable", "moisture", "fertility"):
-            value = getattr(self, name)
-            if value is None:
-                continue
-            value = np.asarray(value, np.float64)
+            value = np.asarray(getattr(self, name), np.float64)
+            value = value if value.ndim else np.full(np.shape(self.height), value)
             if value.shape != np.shape(self.height):
                 raise TetFloraError(f"A site's {name} has {value.shape} cells, its height {np.shape(self.height)}")
             if not np.isfinite(value).all():
@@ -83,8 +82,7 @@ class StandSite:
     @property
     def area(self) -> float:
         """Square meters where plants can be."""
-        here = self.height.size if self.plantable is None else float(self.plantable.sum())
-        return here * self.cell**2
+        return float(self.plantable.sum()) * self.cell**2
 
     def cells(self, x: NDArray, y: NDArray) -> Integers:
         """Index (n,) of the cell, row by row, at places (n,) in meters from the corner; the nearest of those beyond."""
@@ -95,7 +93,7 @@ class StandSite:
     def holds(self, x: NDArray, y: NDArray) -> Mask:
         """Whether plants can be (n,) at places (n,) in meters from the corner."""
         inside = (x >= 0.0) & (y >= 0.0) & (x < self.size[0]) & (y < self.size[1])
-        return inside & (_of(self.plantable, 1.0, self.height).ravel()[self.cells(x, y)] > 0.0)
+        return inside & (self.plantable.ravel()[self.cells(x, y)] > 0.0)
 
     def ground(self, x: NDArray, y: NDArray) -> Floats:
         """Altitude (n,) at places (n,) in meters from the corner, bilinear between the middles of cells."""
@@ -107,11 +105,10 @@ class StandSite:
         warm = self.degree_days - _DAYS * colder - ecology.degree_days
         degree_days = np.where(warm > 0, -np.expm1(-np.maximum(warm, 0.0) / _WARM), 0.0)
         degree_days = np.where(self.coldest_month - colder < ecology.coldest_month, 0.0, degree_days)
-        moisture = _of(self.moisture, 0.5, warm)
+        moisture, food = self.moisture.ravel(), self.fertility.ravel()
         dry = np.interp(ecology.drought, (0.0, 5.0), _DRY)
         wet = np.interp(ecology.waterlogging, (0.0, 5.0), _WET)
         water = _ramp((moisture - dry) / _DRY_WIDTH) * _ramp((wet - moisture) / _WET_WIDTH)
-        food = _of(self.fertility, 0.7, warm)
         fed = _ramp(0.3 + 0.7 * (1.0 - np.maximum(ecology.fertility - food, 0.0) / max(ecology.fertility, 1e-9)))
         return np.round(degree_days * water * fed, _DIGITS)
 
@@ -122,10 +119,6 @@ class StandSite:
             for axis in (0, 1)
         )
         return east.ravel(), north.ravel()
-
-
-def _of(values: NDArray | None, default: float, like: NDArray) -> Floats:
-    return np.full(like.shape, default) if values is None else values.ravel()
 
 
 def _ramp(value: ArrayLike) -> Floats:

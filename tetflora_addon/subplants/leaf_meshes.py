@@ -337,9 +337,8 @@ class _LeafBearers:
                 motion = (again.position - leaves.position) / seconds, (turned - frame) / np.float32(seconds)
             if leaves.stages is not None:
                 places = (*(places or (None, None)), leaves.stages, np.take(bearers.branches.year[:, 1], owner))
-            colors = leaf_colors(rows, self.row, key, *places)
             size = leaves.size if larger is None else larger * leaves.size
-            copies.add(key, leaves.position, frame, size, colors, motion)
+            copies.add(key, leaves.position, frame, size, leaf_colors(rows, self.row, key, *places), motion)
 
     def _runs(self, form: int, vertices: int) -> Iterator[tuple[WholeBranches, *tuple[NDArray, ...]]]:
         """Branches and their counts; branch, number and key of some leaves of a form, which has a number of vertices.

@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 from ..arrays import Arrays, Floats, Floats32, Integers, Keys, Mask, Table, cross, dot, smoothstep, spread, unit
 from ..compiled.averages import tube_perimeter
 from ..compiled.flora import Flora, bounds
-from ..growth.axes import Axes
+from ..growth.axes import FLARE_FALL, Axes
 from ..growth.foliage import leaf_keys, leaf_places, place_leaves
 from ..growth.growth import WholeBranches, branch_counts, leaf_counts, radius_at
 from ..growth.hashing import Draw, child_key, uniform
@@ -325,7 +325,7 @@ def _falls(rows: Table, branches: Branches, segments: Integers) -> Floats:
     step = branches.length / segments
     more, length = collars(rows, branches)
     flared = rows["flare"][branches.row] > 0
-    return np.where(flared, 8 * np.log(100.0) / segments, np.where(more > 0, 2.0 * step / length, 0.0))
+    return np.where(flared, FLARE_FALL / segments, np.where(more > 0, 2.0 * step / length, 0.0))
 
 
 def _stretched(x: Floats, fall: Floats) -> Floats:
@@ -376,7 +376,6 @@ _PIPED = 2.0
 _NARROW, _HIGH, _STRONG = 13.0, 2.4, 1.1
 #: A buttress takes no more of the radius than this leaves.
 _LEAST_RADIUS = 0.55
-_FALL = 8 * np.log(100.0)  # as of the flare
 #: Child index below which random numbers of roots are drawn.
 _ROOTS = 1 << 28
 #: Fraction of a branch from which on it widens toward a fork.
@@ -511,7 +510,7 @@ def swelling(
     if not footed.any():
         return None
     flare = rows["flare"][branches.row] * branches.radius * weight * footed * _STRONG
-    size = flare[owner] * np.exp(-_FALL / _HIGH * t) / np.maximum(radius, 1e-12)
+    size = flare[owner] * np.exp(-FLARE_FALL / _HIGH * t) / np.maximum(radius, 1e-12)
     angle, sizes = buttresses(branches.key)
     around = 2 * np.pi * np.arange(sides) / sides
     bump = np.exp(_NARROW * (np.cos(around[:, None, None] - angle) - 1.0)) - np.i0(_NARROW) * np.exp(-_NARROW)

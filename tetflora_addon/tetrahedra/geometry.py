@@ -2,8 +2,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What can be measured on many tetrahedra at once: volume, quality, faces, silhouette, barycentric coordinates.
 
-A *tetrahedron* is ``(4, 3)`` float64; face ``i`` is the one opposite vertex ``i``. Positive orientation means that the
-edges from vertex 0 to vertices 1, 2 and 3 form a right-handed system.
+A *tetrahedron* is ``(4, 3)`` float64, meters; face ``i`` is the one opposite vertex ``i``. Positive orientation means
+that the edges from vertex 0 to vertices 1, 2 and 3 form a right-handed system.
 """
 
 import numpy as np
@@ -23,7 +23,6 @@ def signed_volume(vertices: Floats) -> Floats:
     Parameters
     ----------
     vertices : (..., 4, 3) float64
-        Tetrahedra, meters.
 
     Returns
     -------
@@ -54,7 +53,6 @@ def quality(vertices: Floats) -> Floats:
     Parameters
     ----------
     vertices : (..., 4, 3) float64
-        Tetrahedra, meters.
 
     Returns
     -------
@@ -75,7 +73,6 @@ def face_area_vectors(vertices: Floats) -> Floats:
     Parameters
     ----------
     vertices : (..., 4, 3) float64
-        Tetrahedra, meters.
 
     Returns
     -------
@@ -95,7 +92,7 @@ def projected_area(vertices: Floats, direction: Floats) -> Floats:
     Parameters
     ----------
     vertices : (..., 4, 3) float64
-        Tetrahedra of either orientation, meters.
+        Of either orientation.
     direction : (3,) or (..., 3) float64
         Unit viewing directions.
 
@@ -114,7 +111,7 @@ def barycentric_gradients(vertices: Floats) -> Floats:
     Parameters
     ----------
     vertices : (..., 4, 3) float64
-        Tetrahedra of either orientation, meters.
+        Of either orientation.
 
     Returns
     -------
@@ -132,7 +129,6 @@ def barycentric(vertices: Floats, points: Floats) -> Floats:
     Parameters
     ----------
     vertices : (..., 4, 3) float64
-        Tetrahedra, meters.
     points : (..., 3) float64
         Points, meters.
 
