@@ -33,14 +33,12 @@ from .files import PART, path_in, read_whole, write_whole
 
 Result = TypeVar("Result")
 Found = TypeVar("Found", Floats, None)
-#: Raise it when files are written in another way.
-_FORMAT = 1
+_FORMAT = 1  # raise it when files are written in another way
 #: All files of a user take no more than so many bytes, each a few thousand; those not used for longest go first.
 MOST_BYTES = 64 << 20
 #: Entries of the folder that are looked at to make room: whoever fills it must not stop the others.
 _MOST_ENTRIES = 50_000
-#: Bytes of a file beside its values: names and headers.
-_HEADERS = 4096
+_HEADERS = 4096  # bytes of a file beside its values: names and headers
 #: Seconds after which a file that was begun and not ended is taken for one of a process that was killed.
 _ABANDONED = 3600.0
 

@@ -20,8 +20,7 @@ from .patches import Hierarchy, Patches
 
 #: Standard deviations along an ellipse's diameter, and the narrowest and the widest kite, of its length.
 _DIAMETER, _NARROW, _WIDE = 4.0, 0.02, 1.5
-#: Draw of the face in whose plane a kite lies.
-_PLANE = 248
+_PLANE = 248  # draw of the face in whose plane a kite lies
 
 
 def kite_mesh(leaves: AssetKites) -> MeshBuffers:
@@ -37,18 +36,14 @@ def kite_mesh(leaves: AssetKites) -> MeshBuffers:
 BATCH = 60_000
 #: Samples of a cluster without children, and how many either kind of surface has at least.
 SAMPLES, FEWEST = 32, 4
-#: Transmission of sheets where the material leaves it open.
-_SHEET_TRANSMISSION = 0.3
-#: Roughness where nobody knows.
-_ROUGHNESS = 0.5
+_SHEET_TRANSMISSION = 0.3  # transmission of sheets where the material leaves it open
+_ROUGHNESS = 0.5  # roughness where nobody knows
 #: Draws of the places of samples.
 ALONG, _U, _V = 241, 242, 243
 #: Islands of solids that are a larger part of all faces' area than this are wood; others are as many as leaves.
 _WOOD = 1.0 / 256.0
-#: Wood of more than this fraction of the largest width is thick.
-_THICK = 0.3
-#: More than the patches of any small cluster.
-_MANY = 1 << 20
+_THICK = 0.3  # wood of more than this fraction of the largest width is thick
+_MANY = 1 << 20  # more than the patches of any small cluster
 _PAIRS = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
 
 

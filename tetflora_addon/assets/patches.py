@@ -29,12 +29,10 @@ from .asset import AssetSurface
 MOST_BYTES = 128 << 20
 #: Squared boundary over area of a flat sheet, at least (a disc has 4π, a half ball 2π): with less it is bent back.
 _SHEET = 2 * np.pi
-#: A face of a leaf has at least this fraction, squared, of the leaf's extent.
-_LEAF_FRACTION = 1 / 16
+_LEAF_FRACTION = 1 / 16  # a face of a leaf has at least this fraction, squared, of the leaf's extent
 #: Leaves are many: none is larger than this fraction of the area of all in the mesh. A wall of one face is no leaf.
 _ONE_OF_MANY = 1 / 64
-#: How often curvature is averaged over neighbors: some faces around a branch.
-_ROUNDS = 6
+_ROUNDS = 6  # how often curvature is averaged over neighbors: some faces around a branch
 
 
 def _classified(positions: Floats, corner_verts: Integers, face_offsets: Integers) -> tuple[Mask, Mask, Floats]:
@@ -142,8 +140,7 @@ mesh_features = memoized(MOST_BYTES)(_classified)
 MOST_FACES = 48
 #: Triangles whose features are found at a time; bounds what that takes to some thirty megabytes.
 BATCH = 100_000
-#: Bits of a coordinate of the curve along which large islands are cut.
-_BITS = 10
+_BITS = 10  # bits of a coordinate of the curve along which large islands are cut
 
 
 @dataclass(frozen=True)

@@ -294,8 +294,7 @@ def _leaves(rows: Table, forms: Forms, bodies: Branches, lines: Axes) -> Iterato
                 yield LeafOutlines(model, leaves.position[of], frame[of], leaves.size[of]), some[owner[of]]
 
 
-#: Raise it when factors are found in another way.
-_METHOD = 1
+_METHOD = 1  # raise it when factors are found in another way
 #: Polygons that are grown of each species, if two plants have no more than a number, and plants at most; of plants that
 #: are still larger than the last number some sub-plants are taken.
 _POLYGONS, _PAIR, _PLANTS, _LARGEST = 200_000, 500_000, 6, 400_000

@@ -318,8 +318,7 @@ def _model_moments(rows: Table, forms: Sequence[Forms]) -> Floats:
     return table[rows["species"], rows["leaf_kind"]]
 
 
-#: Planes of each kind of leaf: quantiles of the areas of its faces.
-_PLANES = 32
+_PLANES = 32  # planes of each kind of leaf: quantiles of the areas of its faces
 
 
 def face_planes(rows: Table, forms: Sequence[Forms]) -> Floats:

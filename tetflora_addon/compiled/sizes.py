@@ -215,8 +215,7 @@ def _branch_parts(flora: Flora, points: Points, row: int, lengths: Floats) -> Cr
 
 _BATCH = 2_000
 _BISECTIONS = 11
-#: Factors that would change by less are found.
-_CLOSE = 0.015
+_CLOSE = 0.015  # factors that would change by less are found
 _reaches: "WeakKeyDictionary[Flora, dict[int, TwigReach]]" = WeakKeyDictionary()
 
 
@@ -320,14 +319,12 @@ def _solved(found: "OuterLimbs", wanted: Floats, least: Floats, most: Floats) ->
 #: East, west, north, south and up.
 DIRECTIONS = np.array([[1.0, 0.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, -1.0, 0.0], [0.0, 0.0, 1.0]])
 UP = 4
-#: Limbs that are grown for each of these.
-_LIKELY = (6, 6, 6, 6, 8)
+_LIKELY = (6, 6, 6, 6, 8)  # limbs that are grown for each of these
 #: Plants, and limbs of these, that tell how far twigs and leaves reach; factors on the lengths of the limbs.
 _KNOWN_PLANTS, _LONG, _HIGH, _FACTORS = 8, 27, 15, (0.6, 1.0, 1.7)
 #: Of limbs that reach almost as far, that one wins whose twigs do: so many standard deviations more than on the mean.
 _LUCK = 0.6
-#: Part of the way that stems of shrubs reach to the sides which is not their own lean.
-_ASIDE = 0.4
+_ASIDE = 0.4  # part of the way that stems of shrubs reach to the sides which is not their own lean
 
 
 @dataclass(frozen=True)

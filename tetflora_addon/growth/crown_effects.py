@@ -19,8 +19,7 @@ from .seeds import BASE, EAST, LEAVES, NORTH, PLAIN, THICKNESS, WIDTH, Branches
 #: Columns of ``crown`` of branches: the first two and the last are those of crown shapes, between them the vector
 #: (east, north) in the branch's own axes.
 COLUMNS, LIGHT = 6, slice(2, 5)
-#: Of their length, what limbs away from the light keep, however much a crown leans.
-_SHORTEST = 0.05
+_SHORTEST = 0.05  # of their length, what limbs away from the light keep, however much a crown leans
 #: Stems of a stool lean at most so many times as far as described.
 MOST_LEANING = 1.5
 #: Laterals so many times as long as what bears them are the stems of a stool (see `species.ages`).

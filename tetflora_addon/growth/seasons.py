@@ -35,8 +35,7 @@ _DEVIATIONS /= _DEVIATIONS.std()
 _FIRST_SIZE, _FRESH = 0.12, 1.6
 #: How far the colors of a plant's leaves follow the plant rather than each leaf by itself.
 _OF_PLANT = 0.5
-#: Days between two entries of tables, and nodes of the integrals from which they are made.
-_STEP = 0.5
+_STEP = 0.5  # days between two entries of tables, and nodes of the integrals from which they are made
 _NODES = 64
 PRESENT, SIZE, AREA, FRESH, AUTUMN, DRY = range(6)
 """Rows of tables: expected number of leaves there are, sum of their sizes and of the squares of these, all over what

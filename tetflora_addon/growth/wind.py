@@ -35,8 +35,7 @@ _STRONG, _STORM = 10.0, 30.0
 #: Frequency of a cantilever, 1.875² / 4π √(E / ρ) radius / length² for wood of 8 GPa and 900 kg/m³ (Euler and
 #: Bernoulli), for what its own branches and leaves weigh besides. Branches as stiff as to be quicker hardly move.
 _SPEED_OF_BENDING, _LOADED, _RATES = 834.0, 0.4, (0.1, 2.5)
-#: Sway over lean: along the wind, across it, and up and down.
-_SWAY = np.array([0.5, 0.5, 0.25])
+_SWAY = np.array([0.5, 0.5, 0.25])  # sway over lean: along the wind, across it, and up and down
 _SWAY_RATES = np.array([1.0, 1.13, 1.29])  # over the natural frequency, or all would move on ellipses
 _SWAY_DRAWS = (Draw.SWAY_ALONG, Draw.SWAY_ACROSS, Draw.SWAY_UP)
 #: Frequencies of gusts in hertz, weights, and cycles a meter across the wind.

@@ -40,12 +40,9 @@ _STEM, _TINTS = 1e-6, ((1.25, 1.1, 0.9), (1.7, 0.75, 0.6))
 _FITS, _FITTED, _GROWTH = 3, 0.01, 0.75
 #: Factors of thickness and width at most, and that of a width by which is seen how the area grows with it.
 _THINNEST, _THICKEST, _WIDER = 0.2, 8.0, 1.5
-#: Needles that hide more of each other than this are scales.
-_SCALES = 0.6
-#: Divisions of closed parts, one more than at most.
-_ROUNDEST = 5
-#: Points on each edge of a coarse model at which its distance from the shape is measured.
-_ON_EDGE = 9
+_SCALES = 0.6  # needles that hide more of each other than this are scales
+_ROUNDEST = 5  # divisions of closed parts, one more than at most
+_ON_EDGE = 9  # points on each edge of a coarse model at which its distance from the shape is measured
 
 Shape = Blade | Needles | Compound
 
@@ -300,10 +297,8 @@ def _model_of(made: LeafSurface) -> LeafModel:
 
 #: The topology of all of them.
 KITE = leaf_model([[0.0, 0.0, 0.0], [0.5, 0.5, 0.0], [0.0, 1.0, 0.0], [-0.5, 0.5, 0.0]], [[0, 1, 2, 3]])
-#: Planes that stand for the faces of one material.
-_PLANES = 4
-#: Normals within so many radians of each other are one plane.
-_FLAT = 0.01
+_PLANES = 4  # planes that stand for the faces of one material
+_FLAT = 0.01  # normals within so many radians of each other are one plane
 #: Mean square of the difference of normals up to which a leaf is a sheet that is folded once.
 _FOLDED_ONCE = 0.006
 _MOVES = 64

@@ -35,8 +35,7 @@ _FLAT_LEAF, _SOLID = 0.02, 0.55
 #: Width of an ovate leaf over the root of its area. With their full width, shoots of pines were drawn one by one in
 #: triangles of a tenth of a pixel: 5.2 million of 1,500 trees at 480 x 270, and 42 primitives a pixel in all.
 _OVATE = 1.13
-#: Directions of silhouettes, and cells along each side of their images.
-_DIRECTIONS, _CELLS = 16, 32
+_DIRECTIONS, _CELLS = 16, 32  # directions of silhouettes, and cells along each side of their images
 
 
 @dataclass(frozen=True)
@@ -396,8 +395,7 @@ def _middles(points: Floats, part: Integers) -> Floats:
 _SPINE, _FELT = (3.6, 1.9, 2.7), (1.7, 0.85, 0.9)
 #: Height and radius of an areole over the distance of areoles, sides of it, and of a spine.
 _CUSHION, _SIDES, _EDGES = (0.07, 0.11), 5, 3
-#: Part at the base of the leaf that is bare.
-_BARE = 0.08
+_BARE = 0.08  # part at the base of the leaf that is bare
 
 
 def spined(model: LeafModel, spines: Spines, part: Integers) -> tuple[LeafModel, Floats32]:

@@ -141,14 +141,12 @@ def tube(points: Floats, radius: Floats, sides: int) -> LeafSurface:
 
 
 _GOLDEN_ANGLE = np.radians(137.508)
-#: What is not seen of the gaps between needles, of their distance along the shoot.
-_GAP = 0.6
+_GAP = 0.6  # what is not seen of the gaps between needles, of their distance along the shoot
 #: Error from which on there are fewer needles, needles are flat, and prisms have three sides.
 SPARSE, FLAT, _THREE = 0.05, 0.004, 0.0012
 #: One of so many needles stands for them all where there are fewer; what is not seen of the gaps then.
 _OF, _SPARSE_GAP = 3, 2.4
-#: Radius of shoots over that of needles, and of both at their ends.
-_TAPER = 0.55
+_TAPER = 0.55  # radius of shoots over that of needles, and of both at their ends
 #: Places along a needle and its widths there, for errors above the first number.
 _PROFILES = (
     (SPARSE, (0.0, 1.0), (1.0, 0.0)),
@@ -266,8 +264,7 @@ def _needles(
 
 #: Tolerance of the outline that all others are taken from.
 FINEST = 2e-4
-#: How far the fold along the midrib is rounded.
-_ROUND = 0.02
+_ROUND = 0.02  # how far the fold along the midrib is rounded
 _REPAIRS = 16
 #: Distance of rays over the root of the tolerance: what a surface that is bent as leaves are sags between them.
 _STEP = 1.6

@@ -156,13 +156,11 @@ Suits = Callable[[Floats], Floats]
 _PATCHES = 2**34  # keys of patches, away from those of plants and clumps
 #: Fallen leaves that cover ground as far as it ever is, m² on a square meter; wood lies there too, but spread wider.
 _LEAVES, _WOOD = 1.2, 3.0
-#: Fraction of low plants that dense litter smothers.
-_SMOTHERED = 0.45
+_SMOTHERED = 0.45  # fraction of low plants that dense litter smothers
 #: Leaves that lie on what is wholly suited to those that have just fallen, m² on a square meter: hardly any place under
 #: any wood gets more.
 FULL = 20.0
-#: Roots and shadow of a dense crown leave this much of what wants shade.
-_LEAST = 0.15
+_LEAST = 0.15  # roots and shadow of a dense crown leave this much of what wants shade
 
 
 class Habitat(Enum):

@@ -154,8 +154,7 @@ def _draw(corners: Floats, slope: Floats, own: Integers, row: Integers, columns:
 
 #: The topographic index, a in meters, that counts as dry and as wet: a ridge, and the floor of a valley with a brook.
 DRY, WET = 2.0, 12.0
-#: Finest cells of the ground that plants ask, meters, and their most.
-_FINEST, _MOST = 1.0, 1_000_000
+_FINEST, _MOST = 1.0, 1_000_000  # finest cells of the ground that plants ask, meters, and their most
 _LEVEL = 0.01  # tan β; less is as level
 _DRAIN = 1e-6  # least fall of filled ground toward its outlet
 _SPREAD = 1.1  # exponent of the fall (Freeman 1991): flow down a cone is even all around

@@ -30,10 +30,8 @@ from .species import Ages, Color, Dead, NodeLaw, Nodes, Order, PartGrown, Range,
 BARE = 0.5
 NARROWER = 0.52
 SLIMMER = 0.57
-#: Limbs, being shorter too, lose so much of that, as a power.
-_LIMBS = 0.75
-#: Dead branches of a stand over those of a free tree at most: the lowest have fallen.
-_MORE_DEAD = 4.0
+_LIMBS = 0.75  # limbs, being shorter too, lose so much of that, as a power
+_MORE_DEAD = 4.0  # dead branches of a stand over those of a free tree at most: the lowest have fallen
 
 
 def with_habit(species: Species, habit: float) -> Species:
@@ -99,25 +97,20 @@ def _raised(start: Range, bare: float, key: str) -> Range:
 STAGES = ("seedling", "sapling", "mature", "old", "dying", "dead")
 #: Below a crown, nodes grow as this power of the height; with forks, there are so many more of them.
 _POWER, _MORE = 0.4, 1.5
-#: A bare part longer than this is the stem of a palm, whose crown is as long at any age.
-_ROSETTE = 0.9
+_ROSETTE = 0.9  # a bare part longer than this is the stem of a palm, whose crown is as long at any age
 #: Powers by which limbs and twigs of a plant without branches between them, and twigs of others, follow the limbs.
 _TWIGS = 0.25
-#: Longest branches in lengths of their parents, where the description has shorter ones.
-_LONGEST = 0.6
+_LONGEST = 0.6  # longest branches in lengths of their parents, where the description has shorter ones
 #: Girth of branches follows length as this power, that of stools the stems'; radius of the thinnest tips, meters.
 _STOUT, _STOOL, _TIP = 1.15, 0.7, 0.0012
 #: In a small plant, the topmost limbs are shorter than the crown's shape has them, the shoots of this year bare of
 #: branches, and trunks even cones.
 _SHORTER_TOP, _LEADER, _EVEN = 0.5, 0.75, 1.3
-#: Leaves on twigs of old trees over those when full-grown, at most.
-_FULLER = 2.0
+_FULLER = 2.0  # leaves on twigs of old trees over those when full-grown, at most
 #: Branches that live for a while, for each of the others, on stems and on limbs; steps in which their number is found.
 _EXTRA, _STEPS = (3.0, 1.5), 14
-#: Meters of height up to which crowns have not closed.
-_SMALL = 3.0
-#: Of the length of a leafy twig: what is longer than so many bears no leaves itself.
-_LEAFY = 4.0
+_SMALL = 3.0  # meters of height up to which crowns have not closed
+_LEAFY = 4.0  # of the length of a leafy twig: what is longer than so many bears no leaves itself
 #: A leaf is at most this fraction of the plant's height, and a seedling has so many.
 _LEAF, _FIRST = 1 / 3, 4.0
 #: Nodes over which branches grow, and within which change of length those of full-grown plants come to be.

@@ -184,8 +184,7 @@ def species_file(path: Path) -> bytes:
 FIRST = "beech"
 
 
-#: Shipped files lie in folders of this one.
-_SHIPPED = Path(__file__).resolve().parent.parent
+_SHIPPED = Path(__file__).resolve().parent.parent  # shipped files lie in folders of this one
 
 
 @dataclass(frozen=True)

@@ -15,8 +15,7 @@ from ..leaves.models import LeafModel
 from .ages import ages_of
 from .species import Ecology, Species
 
-#: Crowns as long as this fraction of the height have all leaves of a free one.
-_FULL = 0.75
+_FULL = 0.75  # crowns as long as this fraction of the height have all leaves of a free one
 
 
 def crown_leaves(leaves: Floats | float, height: Floats, base: Floats, radius: Floats) -> Floats:

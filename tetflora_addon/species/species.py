@@ -32,8 +32,7 @@ from ..parameters import Color, Range, Rgb, described, limited, named
 from .skeletons import Skeleton
 
 _SHARP = 4.0
-#: Limits of rates, 1/year, and powers of curves.
-_CURVE = (0.0001, 0.2), (10, 5)
+_CURVE = (0.0001, 0.2), (10, 5)  # limits of rates, 1/year, and powers of curves
 
 
 @dataclass(frozen=True)
@@ -192,8 +191,7 @@ MAX_AUTUMN = 4
 #: seasons in Germany", 2001, and others).
 _SPRING_DAYS, _AUTUMN_DAYS = 2.2, 2.0
 _MIDSUMMER, _MIDWINTER = 190.0, 10.0
-#: No leaf is farther from the mean than so many standard deviations.
-_FARTHEST = 2.8
+_FARTHEST = 2.8  # no leaf is farther from the mean than so many standard deviations
 
 
 @dataclass(frozen=True)
@@ -339,8 +337,7 @@ BARKS = (
 QUALITY_LIMITS = (0.0001, 1000.0)
 
 
-#: A fork is there once its stems are so long, in lengths of the full-grown branch.
-_FORKS_FROM = 1e-4
+_FORKS_FROM = 1e-4  # a fork is there once its stems are so long, in lengths of the full-grown branch
 
 
 @dataclass(frozen=True, kw_only=True)

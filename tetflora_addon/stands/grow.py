@@ -189,8 +189,7 @@ _SLENDER_LIT, _SLENDER_DARK = 0.72, 1.14
 _SIDE, _SIDE_MORE = (0.61, 0.26), 0.35
 #: Where that is: in lengths of a dome and of a cone below the top, and so much of the height at most counts as length.
 _BESIDE, _LONG = (0.65, 0.85), 0.45
-#: Light beside it, over that in which limbs die, below which it narrows.
-_DARK = 1.5
+_DARK = 1.5  # light beside it, over that in which limbs die, below which it narrows
 #: Fractions of the radius, or of what is lacking, by which a crown narrows and widens in a year.
 _NARROWS, _WIDENS = 0.05, 0.12
 #: Width of a crown as recorded, over the height, at least: shaded saplings are no bare rods; and up to which height.
@@ -201,10 +200,8 @@ _RISES, _SHORTEST = 0.3, 0.12
 _LEANS, _MOST_OFFSET, _TURNS = 6.0, 0.6, 0.08
 #: Light over that of a free plant in which plants grow about half as fast as they can at all.
 _HALF_LIT = 0.1
-#: Girth at which plants cease to become thicker, over the largest that are known.
-_LARGEST = 1.3
-#: Part of the vigor that is this year's.
-_RECENT = 0.3
+_LARGEST = 1.3  # girth at which plants cease to become thicker, over the largest that are known
+_RECENT = 0.3  # part of the vigor that is this year's
 #: Vigor below which plants are likely to die, for shade tolerance 0 and 5, and the chance where it is 0.
 _WEAK, _DIES = (0.2, 0.025), 0.15
 #: Chance to die for other reasons: of so many in a lifespan, for each that is left; when the old die, in lifespans.
@@ -327,8 +324,7 @@ _PLANTED_DIAMETER, _SOWN_DIAMETER = 0.35, 0.25
 _PLANTED_AGE, _SOWN_AGE = 3.0, 3.0
 #: Meters of the grid on which seeds are spread, at least; and seeds per m² that make half as many plants as can come.
 _SEED_CELL, _HALF = 4.0, 20.0
-#: Part of the ground beyond that is below crowns of each species that bear seeds.
-_OUTSIDE = 0.1
+_OUTSIDE = 0.1  # part of the ground beyond that is below crowns of each species that bear seeds
 
 
 def planted(site: StandSite, traits: StandTraits, suitability: Floats, density: float, seed: int) -> Plants:
@@ -436,14 +432,11 @@ def _smoothed(values: Floats, reach: int, axis: int) -> Floats:
     return (sums.take(range(span, span + size), axis) - sums.take(range(size), axis)) / span
 
 
-#: Plants that are looked at together.
-_BLOCK = 1 << 15
+_BLOCK = 1 << 15  # plants that are looked at together
 #: Most records of a stand, some 70 bytes each here and again in the file.
 MOST_RECORDS = 20_000_000
-#: Meters of open ground beyond open edges.
-_MARGIN = 12.0
-#: Meters between the highest and the lowest ground up to which it counts as level.
-_LEVEL = 0.5
+_MARGIN = 12.0  # meters of open ground beyond open edges
+_LEVEL = 0.5  # meters between the highest and the lowest ground up to which it counts as level
 
 
 @dataclass(frozen=True)

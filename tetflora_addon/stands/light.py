@@ -26,10 +26,8 @@ from ..arrays import Floats, Floats32, Integers, Integers32, spread
 from ..errors import TetFloraError
 from ..parallel import blocks, each_on_all_cores, on_all_cores
 
-#: Radii for each cell, and places of the middle across a cell.
-_RADII, _PLACES = 4, 3
-#: Points across a cell that tell how much of it is covered.
-_FINE = 12
+_RADII, _PLACES = 4, 3  # radii for each cell, and places of the middle across a cell
+_FINE = 12  # points across a cell that tell how much of it is covered
 
 
 class Discs(NamedTuple):
@@ -112,8 +110,7 @@ _LAYERS = (0.5, 0.025)
 _UNIT = 1.0 / 65536.0
 #: Rows of a strip at least, and cells about; strips do not depend on anything but the grid.
 _STRIP_ROWS, _STRIP_CELLS = 16, 1 << 15
-#: Cells that light passes together; nothing depends on it.
-_BAND_CELLS = 1 << 17
+_BAND_CELLS = 1 << 17  # cells that light passes together; nothing depends on it
 #: Most numbers of the grid at once, 4 bytes each and twice.
 MOST_VOXELS = 400_000_000
 #: Square meters of sideways variance that light gains for a meter downwards, and the most of it that goes to each of
@@ -121,8 +118,7 @@ MOST_VOXELS = 400_000_000
 _SIDEWAYS, _MOST_SIDE = 1.0, 0.15
 #: Meters by which the ground below a crown counts at most as higher or lower than at its trunk.
 _STEEP = 6.0
-#: Thinnest crown in a column, over its length.
-_THIN = 0.15
+_THIN = 0.15  # thinnest crown in a column, over its length
 
 
 def layer_edge(number: NDArray | int) -> Floats:

@@ -27,8 +27,7 @@ _WARM = 300.0
 #: which those of waterlogging tolerance 0 and 5 cease to.
 _DRY, _DRY_WIDTH = (0.42, 0.02), 0.25
 _WET, _WET_WIDTH = (0.72, 1.25), 0.25
-#: Digits that are kept, so that results are the same with every library of mathematics.
-_DIGITS = 4
+_DIGITS = 4  # digits that are kept, so that results are the same with every library of mathematics
 
 
 @dataclass(frozen=True)
@@ -126,8 +125,7 @@ def _ramp(value: ArrayLike) -> Floats:
 
 
 BREAST_HEIGHT = 1.3
-#: Heights in a table, up to so many of the largest diameter.
-_HEIGHTS, _UPTO = 1000, 1.6
+_HEIGHTS, _UPTO = 1000, 1.6  # heights in a table, up to so many of the largest diameter
 #: Girth that trunks have at breast height, meters, at least and at most; and that of which its slope is taken.
 _LEAST, _MOST, _SLOPE = 0.004, 0.03, 0.01
 _TRAIT_DIGITS = 5

@@ -189,8 +189,7 @@ def _stepped(pattern: NDArray, step: int, rows: int) -> NDArray:
     return out.reshape(-1)
 
 
-#: Vertices of leaves that are worked on at a time: some ten megabytes.
-_VERTEX_BATCH = 120_000
+_VERTEX_BATCH = 120_000  # vertices of leaves that are worked on at a time: some ten megabytes
 #: Steps of leaves that are a kite, and a kite for each plane; that of others is their level, 0 for the species' model.
 _KITE, _PLANES = -2, -1
 #: Leaves change their level at lengths from this fraction of that of the first ones on, each by its own number.

@@ -37,12 +37,9 @@ DEVIATION = 0.5
 MOST_SIDES, MOST_RINGS = 512, 48
 #: Width over the one from which on branches are finer, at which they have all that near wood has.
 _BAND = 2.5
-#: Radius in pixels up to which joints pass for curves.
-_BENT = 8.0
-#: The curve leaves the straight segment by no more than this part of the radius.
-_ASIDE = 0.5
-#: How bent segments are, about.
-_SAGITTA = 0.05
+_BENT = 8.0  # radius in pixels up to which joints pass for curves
+_ASIDE = 0.5  # the curve leaves the straight segment by no more than this part of the radius
+_SAGITTA = 0.05  # how bent segments are, about
 # Largest value of both Hermite polynomials of tangents.
 _HERMITE = 4.0 / 27.0
 # Places on a segment at which it is asked how near it comes.
@@ -374,12 +371,9 @@ _COLLAR, _LONGEST = 0.55, 4.0
 _PIPED = 2.0
 #: Narrowness of a buttress, its height over that of the flare, its size over that of the flare.
 _NARROW, _HIGH, _STRONG = 13.0, 2.4, 1.1
-#: A buttress takes no more of the radius than this leaves.
-_LEAST_RADIUS = 0.55
-#: Child index below which random numbers of roots are drawn.
-_ROOTS = 1 << 28
-#: Fraction of a branch from which on it widens toward a fork.
-_WIDENS = 0.65
+_LEAST_RADIUS = 0.55  # a buttress takes no more of the radius than this leaves
+_ROOTS = 1 << 28  # child index below which random numbers of roots are drawn
+_WIDENS = 0.65  # fraction of a branch from which on it widens toward a fork
 #: Places along a root, and how deep the stump of a trunk is in the ground, in its radii.
 PLACES, SUNK = 14, 0.6
 #: Rings of the ball in which a stem begins beyond a fork, and the angle of the last one below its equator.
@@ -547,10 +541,8 @@ def _roots(rows: Table, trunks: Branches, weight: Floats) -> tuple[Floats, Float
 BUD_RINGS = 7
 _ALONG = np.array([-0.08, 0.06, 0.2, 0.42, 0.68, 0.9, 1.0])
 _WIDTH = np.array([0.5, 0.76, 0.96, 1.0, 0.7, 0.27, 0.0])
-#: Child index of the bud at the end, of which random numbers are drawn.
-_LAST = (1 << 28) + 7
-#: Length of the bud at the end over that of others; variation of lengths.
-_AT_END, _VARIED = 1.3, 0.25
+_LAST = (1 << 28) + 7  # child index of the bud at the end, of which random numbers are drawn
+_AT_END, _VARIED = 1.3, 0.25  # length of the bud at the end over that of others; variation of lengths
 #: How far a bud in an axil leans away from its shoot, and how deep its base is in the wood, in radii of that.
 _LEAN, _SUNK = 0.62, 0.75
 

@@ -25,10 +25,8 @@ from ..growth.wind import moment
 from .pieces import Pieces, wood_areas
 from .rings import BESIDES, Fineness, Pixels, Rings, fine_counts, fine_rings, fineness, keep_inside, ring_sums, rings_of
 
-#: Rings that are worked on at a time: some ten megabytes.
-_RING_BATCH = 48_000
-#: How high stems beyond a fork begin, for materials, meters.
-_ABOVE = 4.0
+_RING_BATCH = 48_000  # rings that are worked on at a time: some ten megabytes
+_ABOVE = 4.0  # how high stems beyond a fork begin, for materials, meters
 
 
 def tube_buffers(

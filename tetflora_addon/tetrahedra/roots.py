@@ -58,8 +58,7 @@ class _View:
     piece: "_Piece"
 
 
-#: A tetrahedron (4, 3), or a piece that is cut further.
-_Piece = Floats | _Cut | _View
+_Piece = Floats | _Cut | _View  # a tetrahedron (4, 3), or a piece that is cut further
 
 
 def view_root(camera: ViewingCamera, bounds: ArrayLike) -> TetrahedralTree:
