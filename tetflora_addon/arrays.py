@@ -119,9 +119,8 @@ class Arrays:
         if not parts:
             return cls.empty()
         some = [p for p in parts if len(p)]  # what is empty lacks columns that are optional
-        return cls(
-            *(_joined([getattr(p, name) for p in (some if name in _optional(cls) else parts)]) for name in _names(cls))
-        )
+        owners = ((name, some if name in _optional(cls) else parts) for name in _names(cls))
+        return cls(*(_joined([getattr(p, name) for p in those]) for name, those in owners))
 
     @classmethod
     def zeros(cls, number: int) -> Self:
@@ -402,10 +401,8 @@ def quaternions(frame: Floats) -> Floats:
     Of four ways to write it, that of the largest component is exact (Shepperd, Journal of Guidance and Control, 1978).
     """
     r = frame
-    trace = np.trace(r, axis1=1, axis2=2)
-    w = np.stack(
-        [1 + r[:, 0, 0] + r[:, 1, 1] + r[:, 2, 2], *(1.0 + 2.0 * r[:, i, i] - trace for i in range(3))], axis=1
-    )
+    trace, first = np.trace(r, axis1=1, axis2=2), 1 + r[:, 0, 0] + r[:, 1, 1] + r[:, 2, 2]
+    w = np.stack([first, *(1.0 + 2.0 * r[:, i, i] - trace for i in range(3))], axis=1)
     a, b, c = r[:, 2, 1] - r[:, 1, 2], r[:, 0, 2] - r[:, 2, 0], r[:, 1, 0] - r[:, 0, 1]
     d, e, f = r[:, 1, 0] + r[:, 0, 1], r[:, 0, 2] + r[:, 2, 0], r[:, 2, 1] + r[:, 1, 2]
     rows = ((w[:, 0], a, b, c), (a, w[:, 1], d, e), (b, d, w[:, 2], f), (c, e, f, w[:, 3]))

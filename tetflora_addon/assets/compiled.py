@@ -193,9 +193,8 @@ def _smallest(hierarchy: Hierarchy) -> tuple[Integers, Integers]:
 def _clusters(hierarchy: Hierarchy, parts: list[Measured]) -> tuple[Clusters, SurfaceSamples]:
     """All clusters, from what is known of the smallest; weights of facets are 1."""
     small, (first, last) = _smallest(hierarchy)
-    sums, low, high, counts = (
-        np.concatenate([getattr(part, name) for part in parts]) for name in ("sums", "low", "high", "counts")
-    )
+    names = "sums", "low", "high", "counts"
+    sums, low, high, counts = (np.concatenate([getattr(part, name) for part in parts]) for name in names)
     samples = SurfaceSamples.concatenate([part.samples for part in parts])
     # Of all that lies between two ends; nothing is summed over one large number less another.
     every = np.array([sums[a:b].sum(axis=0) for a, b in zip(first, last, strict=True)])

@@ -179,16 +179,10 @@ def measured(run: Run) -> Measured:
     sums = np.stack([np.add.reduceat(column.astype(np.float64), start) for column in columns], axis=1)
     samples, counts = _samples(run, owner, start, optical, normal)
     first = np.flatnonzero(run.new_face)
-    return Measured(
-        np.minimum.reduceat(run.corners.min(axis=1), start, axis=0),
-        np.maximum.reduceat(run.corners.max(axis=1), start, axis=0),
-        sums,
-        samples,
-        counts,
-        _leaves(run, optical, normal),
-        run.part[first],
-        run.face[first],
-    )
+    low = np.minimum.reduceat(run.corners.min(axis=1), start, axis=0)
+    high = np.maximum.reduceat(run.corners.max(axis=1), start, axis=0)
+    leaves = _leaves(run, optical, normal)
+    return Measured(low, high, sums, samples, counts, leaves, run.part[first], run.face[first])
 
 
 def _leaves(run: Run, optical: Floats, normal: Floats) -> AssetKites:

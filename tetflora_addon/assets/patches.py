@@ -190,17 +190,11 @@ def patches_of(surface: AssetSurface) -> Patches:
         for axis in range(3):
             center[:, axis] += np.bincount(owner[run], corners[:, :, axis].mean(axis=1), len(size))
     center /= size[:, None]
+    faces = np.bincount(owner, new_face).astype(np.int32)
+    mean_width = (np.add.reduceat(width, first[:-1]) / size).astype(np.float32)
     of = np.cumsum(new_island)[first[:-1]] - 1
-    return Patches(
-        triangle,
-        first,
-        np.bincount(owner, new_face).astype(np.int32),
-        solid[first[:-1]],
-        (np.add.reduceat(width, first[:-1]) / size).astype(np.float32),
-        center,
-        np.add.reduceat(area, start)[of].astype(np.float32),
-        np.bincount(of)[of].astype(np.int32),
-    )
+    whole, pieces = np.add.reduceat(area, start)[of].astype(np.float32), np.bincount(of)[of].astype(np.int32)
+    return Patches(triangle, first, faces, solid[first[:-1]], mean_width, center, whole, pieces)
 
 
 def islands(surface: AssetSurface) -> Integers32:

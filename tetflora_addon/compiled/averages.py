@@ -159,9 +159,8 @@ def average(rows: Table, leaf: RowLeaves) -> Averages:
         area, area_outward, area_young = own_leaf_integrals(*sizes, (low, high), (first + (last - first) * start, last))
         leaf_area[every, n, every] = one_area * area
         inside, tip, young = rows["leaf_color"][:, 0], rows["leaf_color_tip"], rows["leaf_color_young"]
-        leaf_color[:, n] = one_area[:, None] * (
-            area[:, None] * inside + area_outward[:, None] * (tip - inside) + area_young[:, None] * (young - inside)
-        )
+        mean = area[:, None] * inside + area_outward[:, None] * (tip - inside) + area_young[:, None] * (young - inside)
+        leaf_color[:, n] = one_area[:, None] * mean
     whole = profile(exact, every, no_key, np.ones(r), summed=True)
     real = ~rows["phantom"]
     fixed_wood = eye * (tube_perimeter(np.maximum(rows["sides"], 3)) * whole * real)
@@ -213,9 +212,8 @@ def average(rows: Table, leaf: RowLeaves) -> Averages:
             fixed_wood[i] += relative * (fixed_wood[j] + full * full_wood[j])
             fixed_faces[i] += fixed_faces[j] + full * full_faces[j]
             spur_wood[i] += full * spur_wood[j]
-    return Averages(
-        leaves, leaf_area, leaf_color, fixed_wood, full_wood, spur_wood, fixed_faces, full_faces, length, radius
-    )
+    of_wood = fixed_wood, full_wood, spur_wood, fixed_faces, full_faces
+    return Averages(leaves, leaf_area, leaf_color, *of_wood, length, radius)
 
 
 @dataclass(frozen=True)

@@ -263,10 +263,8 @@ def drawn_lines(branches: DrawnBranches) -> DrawnLines:
     values = [np.interp(at, place, v).reshape(number, -1) for v in (*branches.knots.T, branches.radius)]
     knots, radii = np.stack(values[:3], axis=-1), np.maximum(values[3], 1e-6)
     chords = np.linalg.norm(np.diff(knots, axis=1), axis=2).sum(axis=1)
-    return DrawnLines(
-        branches.order.astype(np.int64), segments, knots, radii, _frames(knots, segments), chords, radii[:, 0],
-        np.asarray(branches.outward, dtype=np.float64),
-    )  # fmt: skip
+    order, outward = branches.order.astype(np.int64), np.asarray(branches.outward, dtype=np.float64)
+    return DrawnLines(order, segments, knots, radii, _frames(knots, segments), chords, radii[:, 0], outward)
 
 
 def _frames(knots: Floats, segments: Integers) -> Floats:

@@ -359,9 +359,8 @@ def mean_leaf_colors(rows: Table, row: Integers, outward: Floats, young: Floats)
 
     ``young`` (n,) is their `youth`.
     """
-    inside, tip, new = (
-        gathered(colors, row) for colors in (rows["leaf_color"][:, 0], rows["leaf_color_tip"], rows["leaf_color_young"])
-    )
+    colors = rows["leaf_color"][:, 0], rows["leaf_color_tip"], rows["leaf_color_young"]
+    inside, tip, new = (gathered(of, row) for of in colors)
     mean = inside + (tip - inside) * outward[:, None]
     if (new != inside).any():
         mean += (new - inside) * young[:, None]

@@ -260,10 +260,8 @@ def leaned(points: Floats, up: Floats, turn: Floats) -> Floats:
     angle = rate[:, None] * above
     # The upright axis becomes an arc of the same length.
     steep = np.maximum(rate, 1e-300)[:, None]
-    along, beside = (
-        np.where(angle > 1e-9, v, w)
-        for v, w in ((np.sin(angle) / steep, above), ((1 - np.cos(angle)) / steep, above * angle / 2))
-    )
+    along = np.where(angle > 1e-9, np.sin(angle) / steep, above)
+    beside = np.where(angle > 1e-9, (1 - np.cos(angle)) / steep, above * angle / 2)
     level = points - above[:, :, None] * up[:, None]
     around = np.repeat(axis, level.shape[1], axis=0)
     level = turned_vectors(level.reshape(-1, 3), around, angle.ravel()).reshape(level.shape)
@@ -290,10 +288,8 @@ def fluttered(rows: Table, row: Integers, frame: Floats32, key: Keys, gust: Floa
     bits = [((key >> np.uint64(shift)) & np.uint64(0xFFFFF)).astype(np.float64) * 2.0**-20 for shift in (44, 24, 4)]
     rate = rows["flutter_rate"][row] * (0.75 + 0.5 * bits[2])
     most = (rows["flutter"][row] * gust).astype(np.float32)
-    pitch, roll = (
-        most * np.sin((2 * np.pi * _cycles(air, rate * quicker, ahead, phase)).astype(np.float32))
-        for quicker, phase in ((1.0, bits[0]), (1.37, bits[1]))
-    )
+    cycles = _cycles(air, rate, ahead, bits[0]), _cycles(air, rate * 1.37, ahead, bits[1])
+    pitch, roll = (most * np.sin((2 * np.pi * of).astype(np.float32)) for of in cycles)
     out = np.zeros((3, 3, len(frame)), np.float32)
     across, along, up = frame.transpose(2, 1, 0)
     for sine, first, second, i, j in ((pitch, along, up, 1, 2), (roll, across, out[2], 0, 2)):

@@ -147,9 +147,8 @@ def _cut(start: Floats, end: Floats, reach: Floats, longest: float) -> tuple[Flo
 NO_DISTANCE = 1e-4  # meters; less is none, and its cells could not be counted
 
 # Points that are too close lie at most two cells apart. The own cell comes first: whoever is there is near.
-_NEAR = sorted(
-    ((i, j) for i in range(-2, 3) for j in range(-2, 3) if abs(i) + abs(j) < 4), key=lambda s: s[0] ** 2 + s[1] ** 2
-)
+_NEAR = [(i, j) for i in range(-2, 3) for j in range(-2, 3) if abs(i) + abs(j) < 4]
+_NEAR.sort(key=lambda step: step[0] ** 2 + step[1] ** 2)
 
 
 class Neighbors:

@@ -255,14 +255,10 @@ def grown(
     limit = own(traits.light_compensation)
     died = np.clip(1.0 - below / limit, 0.0, 1.0) * (tall - height + _RISES * (height - base))
     low = np.minimum(base + died, (1.0 - _SHORTEST) * tall)
-    old_east, old_north = (
-        before + _TURNS * (_offset(a, b) - before)
-        for before, a, b in ((one.east, east, west), (one.north, north, south))
-    )
-    return replace(
-        one, basal=basal, height=tall, base=low, radius=wide, east=old_east, north=old_north, vigor=vigor,
-        age=one.age + 1.0,
-    )  # fmt: skip
+    east = one.east + _TURNS * (_offset(east, west) - one.east)
+    north = one.north + _TURNS * (_offset(north, south) - one.north)
+    crown = {"base": low, "radius": wide, "east": east, "north": north}
+    return replace(one, basal=basal, height=tall, vigor=vigor, age=one.age + 1.0, **crown)
 
 
 def _offset(a: Floats, b: Floats) -> Floats:

@@ -98,10 +98,8 @@ def covered(x: Floats, y: Floats, radius: Floats) -> CrownCells:
     kind = (size * _PLACES + v) * _PLACES + u
     crown, index = spread(tables.number[kind])
     index += tables.first[kind][crown]
-    return CrownCells(
-        crown, row[crown] + tables.row[index], column[crown] + tables.column[index], tables.part[index],
-        tables.far[index],
-    )  # fmt: skip
+    cells = row[crown] + tables.row[index], column[crown] + tables.column[index]
+    return CrownCells(crown, *cells, tables.part[index], tables.far[index])
 
 
 #: Layers: the n-th begins at first × n + second × n² meters, finer near the ground, where small plants are.
@@ -236,11 +234,8 @@ class LightGrid:
             total += np.bincount(index_in, upper, len(total))
             below = np.flatnonzero(layer > 0)
             total += np.bincount(index_in[below] - area, (sign * density - upper)[below], len(total))
-        columns = _Columns(
-            len(index), found.crown.astype(np.int32), (foot * of_layer + cells).astype(np.int32),
-            (head * of_layer + cells).astype(np.int32), under.astype(np.float32), over.astype(np.float32),
-            density.astype(np.float32),
-        )  # fmt: skip
+        places = (of.astype(np.int32) for of in (found.crown, foot * of_layer + cells, head * of_layer + cells))
+        columns = _Columns(len(index), *places, *(of.astype(np.float32) for of in (under, over, density)))
         rows = np.arange(low, high) % self.rows
         return columns, rows, total.astype(np.int32).reshape(layers, high - low, self.columns)
 
