@@ -233,13 +233,8 @@ def dot(a: NDArray, b: NDArray) -> NDArray:
 
 def cross(a: NDArray, b: NDArray) -> NDArray:
     """Vector products (n, 3); numpy's own shuffles axes."""
-    return np.array(
-        [
-            a[:, 1] * b[:, 2] - a[:, 2] * b[:, 1],
-            a[:, 2] * b[:, 0] - a[:, 0] * b[:, 2],
-            a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0],
-        ]
-    ).T
+    (ax, ay, az), (bx, by, bz) = a.T, b.T
+    return np.array([ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx]).T
 
 
 def products(a: NDArray, b: NDArray) -> NDArray:

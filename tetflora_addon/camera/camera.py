@@ -147,12 +147,8 @@ class Camera:
             # There is nothing beyond the poles, nor beyond the whole way round.
             across = min(across, int((2.0 * np.pi - (right - left)) / (2.0 * step_x) + 1e-9))
             up = min(up, max(int(min(np.pi / 2.0 - top, bottom + np.pi / 2.0) / step_y + 1e-9), 0))
-        return replace(
-            self,
-            window=(left - across * step_x, right + across * step_x, bottom - up * step_y, top + up * step_y),
-            width=self.width + 2 * across,
-            height=self.height + 2 * up,
-        )
+        window = left - across * step_x, right + across * step_x, bottom - up * step_y, top + up * step_y
+        return replace(self, window=window, width=self.width + 2 * across, height=self.height + 2 * up)
 
     def longitude_latitude(self, local: Floats) -> tuple[Floats, Floats]:
         """Place on a panorama of points ``(..., 3)`` in camera space, radians.

@@ -102,11 +102,8 @@ _LEAF_DTYPE = np.dtype(
     + [("any_fresh", np.bool_), ("colors", np.int64), ("fresh", np.float64, (3,)), ("dry", np.float64, (3,))]
     + [("autumn", np.float64, (MAX_AUTUMN, 3))]
 )
-YEAR_COLUMN = [
-    ("year", _LEAF_DTYPE),
-    ("follows", np.bool_),
-    *((name, np.float64) for name in ("day", "middle", "spring", "autumn")),
-]
+YEAR_COLUMN = [("year", _LEAF_DTYPE), ("follows", np.bool_)]
+YEAR_COLUMN += [(name, np.float64) for name in ("day", "middle", "spring", "autumn")]
 """``year`` are the days of the leaves that the row bears, counted from ``origin``, half a year before the middle of
 their life, and of the fall those after the change of color; ``follows`` whether there are any; ``day`` is the scene's,
 ``middle`` that in the middle of the leaves' life, ``spring`` and ``autumn`` days by which plants differ."""

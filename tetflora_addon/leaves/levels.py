@@ -349,11 +349,8 @@ def leaf_planes(model: LeafModel) -> LeafModel:
         area = model.shown_area * one.area / whole
         positions.append(_kite(model, area, one.normal, (points[fan], areas[fan]), one.fold or 0.0))
     corners = np.array(positions)
-    return replace(
-        leaf_model(corners.reshape(-1, 3), np.arange(4 * len(found)).reshape(-1, 4).tolist()),
-        uv=_texture(model, corners).reshape(-1, 2),
-        material_index=_materials_of(model, found),
-    )
+    made = leaf_model(corners.reshape(-1, 3), np.arange(4 * len(found)).reshape(-1, 4).tolist())
+    return replace(made, uv=_texture(model, corners).reshape(-1, 2), material_index=_materials_of(model, found))
 
 
 @dataclass(frozen=True)

@@ -206,16 +206,9 @@ def place(
         sowing.refused["companions"] += int((~stay).sum())
         position, up, keys, species = position[stay], up[stay], keys[stay], species[stay]
         reason = sowing.reason(len(position))
-    return Placement(
-        position=position,
-        azimuth=2.0 * np.pi * uniform(keys, SiteDraw.AZIMUTH),
-        scale=_scales(position[:, 2], keys, site, rules),
-        species=species,
-        seed=_positive(keys),
-        wanted=sowing.wanted,
-        reason=reason,
-        up=_tilted(up, rules.tilt),
-    )
+    azimuth, scale = 2.0 * np.pi * uniform(keys, SiteDraw.AZIMUTH), _scales(position[:, 2], keys, site, rules)
+    up = _tilted(up, rules.tilt)
+    return Placement(position, azimuth, scale, species, _positive(keys), sowing.wanted, reason, up)
 
 
 def without(placement: Placement, bare: Sequence[Path]) -> Placement:

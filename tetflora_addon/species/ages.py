@@ -408,12 +408,8 @@ class _Aged:
         if number <= own:
             return changes
         taken = {name: getattr(twig, name) for name in vars(order) if name.startswith("leaf")}
-        return {
-            **taken,
-            "leaves": Range(number, number * twig.leaves.variation / twig.leaves.mean),
-            "leaf_start": Range(min(start, 0.98)),
-            "leaf_size": self._leaf(twig),
-        }
+        leaves = Range(number, number * twig.leaves.variation / twig.leaves.mean)
+        return taken | {"leaves": leaves, "leaf_start": Range(min(start, 0.98)), "leaf_size": self._leaf(twig)}
 
     def _barked(self, order: Order) -> Order:
         """Gray in death, and without flowers."""

@@ -205,13 +205,9 @@ def _kept(described: Species, changed: Species) -> Species:
             length = shorter if i > 0 and not spur else 1.0
             thick = _allowed(old, "thickness", wanted / length / (1.0 if spur else thicker))
             thicker *= thick
-        new = replace(
-            new,
-            length=old.length.scaled(shorter) if i == 1 and not spur else old.length,
-            thickness=old.thickness.scaled(thick),
-            leaf_size=old.leaf_size.scaled(sizes[i]),
-        )
-        out.append(_bent_alike(old, new))
+        same = {"length": old.length.scaled(shorter) if i == 1 and not spur else old.length}
+        same |= {"thickness": old.thickness.scaled(thick), "leaf_size": old.leaf_size.scaled(sizes[i])}
+        out.append(_bent_alike(old, replace(new, **same)))
     return replace(_with_tiers(changed, out), leaf=widened.leaf, blossom=widened.blossom, quality=1.0)
 
 
