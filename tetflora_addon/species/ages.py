@@ -347,17 +347,17 @@ class _Aged:
         return new * (_LEADER + (1 - _LEADER) * new)
 
     def _nodes(
-        self, o: int, start: float, more: float = 1.0, until: float = 1.0, kept: float = 1.0, extra: float = 0.0
+        self, o: int, start: float, more: float = 1.0, until: float = 1.0, kept: float = 1.0, extra: float | None = None
     ) -> tuple[float, Nodes]:
         """Factor on a number of children, and their nodes; with so many more of them below the crown.
 
-        ``extra`` more live for a while; 0 where none may.
+        For each of the fresh ones ``extra`` more live for a while; None for sorts that have no such children.
         """
         start, now = min(start, 0.99), 1.0 if o < self.stem else self.now[o]
         power = 1.0 if start > _ROSETTE else _POWER
         law = NodeLaw(start, 1.0, power, 1.0, more * start / ((1 - start) * power))
         first, top = (float(law.number_at(place)) for place in (self._bare(o, start), until * now))
-        fresh = self.fresh if extra else 0.0
+        extra, fresh = (0.0, 0.0) if extra is None else (extra, self.fresh)
         number = kept * (top - first) * (1 + extra * fresh)
         if number <= 0:
             return 0.0, Nodes(0.0, 0.0, start)
