@@ -146,12 +146,11 @@ def orientation_of(rows: Table, forms: Sequence[Forms], leaf: Floats, wood: Floa
     skies = _skies_met(rows, length)
     for i in range(len(rows) - 1, -1, -1):
         # Directions (n, 3) of the sky, every other one of those that are met, the rest all around.
-        met = skies[i]
         cos = 1 - 2 * (np.arange(_BRANCHES) + 0.5) / _BRANCHES
         if bool(rows["order"][i] == 0):  # most plants stand, and few lie
             cos = 1 - 2 * ((1 - cos) / 2) ** 3
         sky = spiral(cos, np.arange(_BRANCHES))
-        sky[1::2] = met[thinned(len(met), len(sky[1::2]))]
+        sky[1::2] = skies[i][thinned(len(skies[i]), len(sky[1::2]))]
         branches = _sample_branches(i, float(length[i]), sky)
         lines = axes(rows, branches)
         children, owner, stands = _some_children(rows, branches, lines)

@@ -151,8 +151,7 @@ def sized(
             for n, (age, dead, crowded) in enumerate(stages.tolist()):
                 here = which.reshape(-1) == n
                 these = own[here]
-                still = some.lives is None or dead
-                measure = (_still if still else _grown)(species, age, bool(crowded))
+                measure = (_still if some.lives is None or dead else _grown)(species, age, bool(crowded))
                 own_scale, own_crown = measure.fitted(seeds.take(these), some.take(here))
                 scale[these] *= own_scale
                 crown[these], number[these] = own_crown, len(kinds)

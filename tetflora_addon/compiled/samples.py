@@ -140,13 +140,12 @@ class _Points(Arrays):
     limbs: "Limbs | None" = None
 
     @classmethod
-    def on(cls, rows: Table, one: "_Arrived", branch: Integers, position: NDArray, *rest: NDArray) -> Self:
+    def on(cls, rows: Table, one: "_Arrived", branch: Integers, place: NDArray, frame: NDArray, *rest: NDArray) -> Self:
         """Points on branches, given by number."""
         row = one.branches.row[branch]
         short = rows["order"][row[:1]] == SPUR_ORDER
-        offset = position - gathered(one.branches.position, branch) if short.all() else np.zeros_like(position)
-        frame, *others = rest
-        return cls(one.line[:, branch].T, position, offset, frame, row, *others)
+        offset = place - gathered(one.branches.position, branch) if short.all() else np.zeros_like(place)
+        return cls(one.line[:, branch].T, place, offset, frame, row, *rest)
 
 
 @dataclass

@@ -368,13 +368,10 @@ def _with_faces(model: LeafModel, points: NDArray, corners: NDArray, uv: NDArray
     """A model of triangles and of some faces of another one."""
     size = np.diff(model.face_offsets)[others]
     kept = np.repeat(model.face_offsets[:-1][others] - np.cumsum(size) + size, size) + np.arange(size.sum())
-    return replace(
-        model,
-        positions=points,
-        corner_verts=np.append(corners.ravel(), model.corner_verts[kept]).astype(np.int32),
-        face_offsets=np.cumsum(np.concatenate([[0], np.full(len(corners), 3), size])).astype(np.int32),
-        uv=np.concatenate([uv.reshape(-1, 2), model.uv[kept]]).astype(np.float32),
-    )
+    verts = np.append(corners.ravel(), model.corner_verts[kept]).astype(np.int32)
+    offsets = np.cumsum(np.concatenate([[0], np.full(len(corners), 3), size])).astype(np.int32)
+    uv = np.concatenate([uv.reshape(-1, 2), model.uv[kept]]).astype(np.float32)
+    return replace(model, positions=points, corner_verts=verts, face_offsets=offsets, uv=uv)
 
 
 def _areas(points: NDArray, corners: NDArray, part: NDArray, count: int | None = None) -> Floats:
@@ -463,12 +460,9 @@ def _pyramids(base: Floats, tip: Floats, x: Floats, y: Floats, radius: float, si
 
 def _with_triangles(model: LeafModel, points: Floats) -> LeafModel:
     """A model with triangles (t, 3, 3) more, whose texture lies below that of leaves, as that of stalks."""
-    corners = len(model.positions) + np.arange(3 * len(points))
+    positions = np.concatenate([model.positions, points.reshape(-1, 3)])
+    verts = np.append(model.corner_verts, np.arange(len(model.positions), len(positions))).astype(np.int32)
     ends = model.face_offsets[-1] + 3 * np.arange(1, len(points) + 1)
-    return replace(
-        model,
-        positions=np.concatenate([model.positions, points.reshape(-1, 3)]),
-        corner_verts=np.append(model.corner_verts, corners).astype(np.int32),
-        face_offsets=np.append(model.face_offsets, ends).astype(np.int32),
-        uv=np.concatenate([model.uv, np.tile([[0.5, -0.5]], (3 * len(points), 1))]).astype(np.float32),
-    )
+    offsets = np.append(model.face_offsets, ends).astype(np.int32)
+    uv = np.concatenate([model.uv, np.tile([[0.5, -0.5]], (3 * len(points), 1))]).astype(np.float32)
+    return replace(model, positions=positions, corner_verts=verts, face_offsets=offsets, uv=uv)

@@ -125,8 +125,7 @@ def ages_of(species: Species) -> Ages:
     """How a species grows; without a description, as plants of its size do."""
     if species.ages is not None:
         return species.ages
-    stem = _stem(species)
-    height = float(np.prod([order.length.mean for order in species.orders[: stem + 1]]))
+    height = float(np.prod([order.length.mean for order in species.orders[: _stem(species) + 1]]))
     if height < 1.5 or len(species.orders) < 3 or species.skeleton is not None:
         full = 1.0 if height < 3 else 3.0 * height
         return Ages(full, (3.0 / full, 1.3), scaled=True)

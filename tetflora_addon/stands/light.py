@@ -61,8 +61,7 @@ def _disc(radius: int, row: int, column: int) -> tuple[NDArray, NDArray, NDArray
         covered[reach, reach] = 1.0
     mean = by_cell(np.where(inside, far, 0.0)) / np.maximum(covered, 1.0)
     rows, columns = np.nonzero(covered)
-    part = covered[rows, columns] / covered.sum()
-    return rows - reach, columns - reach, part, mean[rows, columns]
+    return rows - reach, columns - reach, covered[rows, columns] / covered.sum(), mean[rows, columns]
 
 
 @cache
@@ -92,8 +91,7 @@ def covered(x: Floats, y: Floats, radius: Floats) -> CrownCells:
     column, row = np.floor(x).astype(np.int64), np.floor(y).astype(np.int64)
     size = np.rint(radius * _RADII).astype(np.int64)
     size[radius <= 0.5] = 0
-    u = ((x - column) * _PLACES).astype(np.int64)
-    v = ((y - row) * _PLACES).astype(np.int64)
+    u, v = (((place - cell) * _PLACES).astype(np.int64) for place, cell in ((x, column), (y, row)))
     tables = _discs(int(size.max(initial=0)))
     kind = (size * _PLACES + v) * _PLACES + u
     crown, index = spread(tables.number[kind])

@@ -165,8 +165,7 @@ class _Nodes(Arrays):
     @classmethod
     def terminal(cls, parent: Integers32, level: NDArray[np.int16], inside: Mask) -> Self:
         """Nodes that are not divided and have no tetrahedra."""
-        known = {"parent": parent, "level": level, "inside": inside}
-        new = replace(cls.zeros(len(parent)), **known)
+        new = replace(cls.zeros(len(parent)), parent=parent, level=level, inside=inside)
         new.children[:], new.vertices[:] = -1, np.nan
         return new
 
