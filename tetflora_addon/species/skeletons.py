@@ -179,8 +179,7 @@ def joined_edges(chains: Chains) -> tuple[Floats, Integers, Integers]:
     margin = np.maximum(points[edges, 3].max(axis=1), near)[:, None]
     low = points[edges, :3].min(axis=1) - margin
     high = points[edges, :3].max(axis=1) + margin
-    found: list[tuple[int, float]] = []  # edge, fraction along it
-    joints: list[Floats] = []
+    found: list[tuple[int, float, Floats]] = []  # edge, fraction along it, and the joint there
     for chain in np.flatnonzero(~chains.cyclic):
         for end in (chains.first[chain], chains.first[chain + 1] - 1):
             here = points[end, :3]
@@ -194,16 +193,15 @@ def joined_edges(chains: Chains) -> tuple[Floats, Integers, Integers]:
             if len(gap) and gap.min() <= 1:
                 best = int(gap.argmin())
                 points[end, :3] = on_line[best, :3]
-                found.append((int(close[best]), float(fraction[best, 0])))
-                joints.append(on_line[best])
+                found.append((int(close[best]), float(fraction[best, 0]), on_line[best]))
                 break
     if not found:
         return points, edges, line
     # Each edge that bears joints becomes a chain through them.
-    bearer, fraction = np.array([e for e, _ in found]), np.array([s for _, s in found])
+    bearer, fraction, joints = (np.array(of) for of in zip(*found, strict=True))
     order = np.lexsort((fraction, bearer))
     bearer, new = bearer[order], len(points) + np.arange(len(found))
-    points = np.concatenate([points, np.array(joints)[order]])
+    points = np.concatenate([points, joints[order]])
     first = np.diff(bearer, prepend=-1) != 0
     final = np.diff(bearer, append=-1) != 0
     before = np.where(first, edges[bearer, 0], new - 1)
