@@ -83,7 +83,6 @@ class Flora:
     transmission: Floats  # (r,): fraction of scattered light that goes through the leaves of the sub-plant
     averages: Averages  # all expected totals by the row that contributes them
     area_nodes: Floats  # (r, 3): expected one-sided area of leaves at `averages.NODES`, m² at plant scale 1
-    color_nodes: Floats  # (r, 3, 3): area times mean color at the same places
     calm: Self | None = None  # the same without the wind that this one is in
     summer: Self | None = None  # the same in summer, where this one is on another day of the year
     day: DayTotals | None = None  # what the day leaves of leaves; with ``summer``
@@ -193,7 +192,7 @@ class Flora:
         if subplants.year is not None:
             return self.day.leaf_colors(subplants)
         area = self._at_place(self.area_nodes, subplants)
-        return self._at_place(self.color_nodes, subplants) / np.maximum(area, 1e-300)[:, None]
+        return self._at_place(self.averages.leaf_color, subplants) / np.maximum(area, 1e-300)[:, None]
 
     def wood_areas(self, subplants: Branches) -> Floats:
         """Expected surface (n,) of the branches of sub-plants, m²."""
@@ -309,7 +308,6 @@ def _compiled(species: tuple[Species, ...]) -> Flora:
         transmission=area @ leaf.transmission / np.maximum(leaf_area, 1e-300),
         averages=totals,
         area_nodes=totals.leaf_area.sum(axis=2),
-        color_nodes=totals.leaf_color,
     )
 
 

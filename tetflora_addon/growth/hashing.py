@@ -24,7 +24,7 @@ _TO_UNIT = 2.0**-53
 
 
 class Draw(IntEnum):
-    """What a random number is drawn for; one number for each attribute of a branch or leaf."""
+    """What a random number is drawn for; a number for each attribute of a branch or leaf, which is never another's."""
 
     LENGTH, THICKNESS, ANGLE, AZIMUTH, ROLL, PLACE = range(1, 7)
     BRANCHES, BRANCHES_ROUND, LEAVES, LEAVES_ROUND = range(7, 11)

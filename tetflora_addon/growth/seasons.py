@@ -152,7 +152,10 @@ def _numbers(leaf: LeafYear) -> np.void:
 def plant_years(rows: Table, row: Integers, key: Keys) -> Floats | None:
     """The day that it is for plants (n, 2), and where they stand among autumn colors, 0 to 1; None without seasons.
 
-    ``row`` (n,) are those of their trunks.
+    Parameters
+    ----------
+    row, key : (n,) int and (n,) uint64
+        Of their trunks.
     """
     if not is_seasonal(rows):
         return None
