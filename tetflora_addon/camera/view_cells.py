@@ -18,7 +18,7 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import Floats, quaternions
+from ..arrays import Floats, Integers, quaternions
 from ..parameters import script_setting, setting
 from .camera import Camera
 
@@ -183,19 +183,16 @@ def _standing_back(camera: Camera, turned: Floats, reach: Floats) -> Camera | No
         lens, focus = camera.lens_radius, camera.focus
         away = np.array([*-middle, 1.0]) * setback
     pixels = np.ceil(2.0 * half / step).astype(int)
-    half = pixels * step / 2.0
-    return replace(
-        camera,
-        position=camera.position + camera.frame @ away,
-        window=(middle[0] - half[0], middle[0] + half[0], middle[1] - half[1], middle[1] + half[1]),
-        near=near,
-        far=far,
-        width=int(pixels[0]),
-        height=int(pixels[1]),
-        setback=setback if camera.kind == "PERSP" else 0.0,
-        lens_radius=lens,
-        focus=focus,
-    )
+    setback = setback if camera.kind == "PERSP" else 0.0
+    depths = {"near": near, "far": far, "setback": setback, "lens_radius": lens, "focus": focus}
+    position = camera.position + camera.frame @ away
+    return replace(_with_window(camera, middle, pixels * step / 2.0, pixels), position=position, **depths)
+
+
+def _with_window(camera: Camera, middle: Floats, half: Floats, pixels: Integers) -> Camera:
+    """A camera with another window, by its middle and its half size (2,), and with so many pixels (2,)."""
+    (left, bottom), (right, top) = middle - half, middle + half
+    return replace(camera, window=(left, right, bottom, top), width=int(pixels[0]), height=int(pixels[1]))
 
 
 def _with_all_windows(camera: Camera) -> Camera:
@@ -221,10 +218,7 @@ def _zoomed(camera: Camera) -> Camera:
     finest = fine * np.array([np.sqrt(aspect), 1.0 / np.sqrt(aspect)])
     widest = 2.0 ** (1.0 / ZOOMS)
     size = np.ceil(np.array([camera.width, camera.height]) * widest).astype(int)
-    middle = place.mean(axis=1) * finest * np.sqrt(widest)
-    half = size * finest / 2.0
-    window = (middle[0] - half[0], middle[0] + half[0], middle[1] - half[1], middle[1] + half[1])
-    return replace(camera, window=window, width=int(size[0]), height=int(size[1]))
+    return _with_window(camera, place.mean(axis=1) * finest * np.sqrt(widest), size * finest / 2.0, size)
 
 
 def _lens_of_cell(camera: Camera) -> tuple[float, float]:

@@ -235,8 +235,7 @@ class _Sowing:
         self, site: Site, rules: Rules, spacing: Spacing, company: Company, suits: Mapping[int, Suits]
     ) -> None:
         self.site, self.rules, self.spacing, self.company, self.suits = site, rules, spacing, company, suits
-        self.wanted = 0
-        self.drawn, self.suitable = 0, 0
+        self.wanted = self.drawn = self.suitable = 0
         self.lost = dict.fromkeys(REMEDIES, 0)
         self.refused = {"companions": 0, "distance": 0}
         self._parts: list[tuple[NDArray, ...]] = []
