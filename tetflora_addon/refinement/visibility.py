@@ -70,16 +70,6 @@ class AlphaBuffer:
         Where each pixel's ray ends at an opaque polygon, as `occluder_depth` gives it for the same size.
     pixel_weight : (height · width,) float64, optional
         Pixels of the final image that each pixel stands for, where the image is not the camera's own.
-
-    Attributes
-    ----------
-    width, height : int
-        Size of the buffer, pixels.
-
-    Raises
-    ------
-    ValueError
-        If the occluders were drawn for a buffer of another size.
     """
 
     def __init__(
@@ -216,8 +206,7 @@ class Buffers:
         return self.depth.reshape(height, width)[np.ix_(row, column)].ravel()
 
 
-#: Side of a face for the longer side of a buffer. A face spans a quarter of the way round; in its corners its pixels
-#: are several times as dense as in the middle.
+#: Side of a face, a quarter of the way round, for the longer side of a buffer; in its corners pixels are denser.
 FACE_FRACTION = 0.5
 
 #: Directions and upward directions of the six faces in camera space (x right, y up, z back).

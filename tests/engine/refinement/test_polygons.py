@@ -105,7 +105,7 @@ def divided(polygons: Polygons, seed: int, slack: float, rounds: int = 4) -> tup
     """Polygons in a tree that a camera roots and random choices divide."""
     rng = np.random.default_rng(seed)
     camera = support.camera(rng.uniform(-9, 9, 3), rng.uniform(-3, 3, 3))
-    tree = view_root(camera, polygons.bounding_box())
+    tree = view_root(camera, support.box_around(polygons))
 
     def loose(points: np.ndarray) -> np.ndarray:
         return np.full(len(points), slack)
