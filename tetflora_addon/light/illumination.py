@@ -276,8 +276,7 @@ ORDERS = 2
 FRONT, BACK = "tf_light_front", "tf_light_back"
 #: Maximum longer side in pixels of a lamp's buffer, with ground in it and without.
 GROUND_PIXELS, OPEN_PIXELS = 1024, 4096
-#: Suns have views of their own of what is nearer to the camera than these fractions of the distance to the farthest
-#: leaf, if so many sheets are there.
+#: Suns have own views of what is nearer than these fractions of the distance to the farthest leaf, of so many sheets.
 NEAR_FRACTIONS, NEAR_SHEETS = (1 / 32, 1 / 8), 1000
 
 

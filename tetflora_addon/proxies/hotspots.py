@@ -124,18 +124,16 @@ class LightRatios(Arrays):
         return np.clip(balanced_colors(color, self.hotspot[owner]) * (mean * lit**-power)[:, None], 0.0, 1.0)
 
 
-def light_ratios(
-    flora: Flora, subplants: Branches, facet: Floats, camera: Camera, lights: Sequence[Light]
-) -> LightRatios:
+def light_ratios(flora: Flora, plants: Branches, facet: Floats, camera: Camera, lights: Sequence[Light]) -> LightRatios:
     """Those of sub-plants (n) with facets of sides (n,), meters; of hotspots the mean over lamps by their strength.
 
     The sky has no hotspot. Where there are lamps, it is taken for little.
     """
-    place = subplants.position + 0.5 * subplants.length[:, None] * subplants.frame[:, :, 2]
-    radius, low, high = extents(flora, subplants, farthest=False).T
-    volume = _FILLED * np.pi * radius**2 * (high - low) * subplants.length**3
-    extinction = 0.5 * flora.leaf_areas(subplants) / np.maximum(volume, 1e-300)
-    leaf, eye = np.sqrt(flora.one_leaf_area(subplants)), to_eye(camera, place)
+    place = plants.position + 0.5 * plants.length[:, None] * plants.frame[:, :, 2]
+    radius, low, high = extents(flora, plants, farthest=False).T
+    volume = _FILLED * np.pi * radius**2 * (high - low) * plants.length**3
+    extinction = 0.5 * flora.leaf_areas(plants) / np.maximum(volume, 1e-300)
+    leaf, eye = np.sqrt(flora.one_leaf_area(plants)), to_eye(camera, place)
     total, strength, most = (np.zeros(len(place)) for _ in range(3))
     strongest = np.zeros_like(place)
     for light in lights:
