@@ -186,10 +186,8 @@ def _shapes(path: Path) -> tuple[list[_Feature], System]:
             raise ValueError
         number = len(features)
         properties = rows[number] if rows is not None and number < len(rows) else {}
-        deleted = properties is None
-        features.append(
-            {"geometry": None if deleted else _shape(record), "properties": properties or {}, LAYER: path.stem}
-        )
+        geometry = None if properties is None else _shape(record)  # it is deleted
+        features.append({"geometry": geometry, "properties": properties or {}, LAYER: path.stem})
         at += 8 + size
         if len(features) > MAX_ROWS:
             raise SceneError(f"{path.name}: more than {MAX_ROWS:,} features; cut it")

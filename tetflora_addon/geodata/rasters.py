@@ -306,9 +306,8 @@ def world_file(path: Path) -> list[Floats]:
     lines = read_whole(found, _SMALL).decode("latin-1").split()
     if len(lines) != 6:
         raise SceneError(f"{found.name}: {len(lines)} numbers; a world file has six, one on each line; correct it")
-    a, d, b, e, x, y = (
-        _number(text.replace(",", "."), f"{found.name}: line {number}") for number, text in enumerate(lines, 1)
-    )
+    numbered = enumerate(lines, 1)
+    a, d, b, e, x, y = (_number(text.replace(",", "."), f"{found.name}: line {number}") for number, text in numbered)
     if not abs(a * e - b * d) > 0.0:
         raise SceneError(f"{found.name}: line 1: its cells have no size; correct it")
     return [np.array([x, y]), np.array([a, d]), np.array([b, e])]
