@@ -350,7 +350,6 @@ def _tidy() -> None:
 
 
 def _start_all() -> None:
-    """Start all processes."""
     while True:
         with _pool.changed:
             if len(_pool.children) >= number() or (own := _started()) is None:
