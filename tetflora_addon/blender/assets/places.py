@@ -625,9 +625,8 @@ class Scatter:
     def finish(self) -> None:
         """Gather the places of each target."""
         for target, parts in self._parts.items():
-            matrices, keys = (
-                column[0] if len(parts) == 1 else np.concatenate(column) for column in zip(*parts, strict=True)
-            )
+            columns = zip(*parts, strict=True)
+            matrices, keys = (own[0] if len(own) == 1 else np.concatenate(own) for own in columns)
             bad = int((~np.isfinite(matrices).all(axis=(1, 2))).sum())
             if bad:
                 raise SceneError(

@@ -10,7 +10,7 @@ other USD are read as places of plants.
 Sources: UsdGeomPointInstancer and UsdPreviewSurface as openusd.org documents them.
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -234,12 +234,10 @@ def _write_surface(pxr: SimpleNamespace, stage: object, surface: BakedSurface) -
     place.CreateInput("varname", types.String).Set("st")
     for name, file in surface.textures.items():
         if name != "card":
-            _write_texture(pxr, stage, f"{path}/{name}", name, file, (shader, place))
+            _add_texture(pxr, stage, f"{path}/{name}", name, file, (shader, place))
 
 
-def _write_texture(
-    pxr: SimpleNamespace, stage: object, path: str, name: str, file: str, ends: tuple[object, object]
-) -> None:
+def _add_texture(pxr: SimpleNamespace, stage: object, path: str, name: str, file: str, ends: Sequence[object]) -> None:
     """A texture between the shaders that use it and that tell its place."""
     types, (shader, place) = pxr.Sdf.ValueTypeNames, ends
     image = pxr.UsdShade.Shader.Define(stage, path)
@@ -262,16 +260,11 @@ def _write_texture(
     shader.CreateInput(key, of).ConnectToSource(image.ConnectableAPI(), output)
 
 
-def read_parts(path: Path) -> Iterator[tuple[str, dict, PointAttributes]]:
+def _read_parts(path: Path) -> Iterator[tuple[str, dict, PointAttributes]]:
     """Plants of a file: for each instancer or cloud of points its name, custom data, and attributes of its points.
 
     Points that TetFlora has not written have the data ``{}``, and attributes in the world: places, and where they are
     told scales, and numbers that are named as those of fields.
-
-    Raises
-    ------
-    TetFloraError
-        It is no USD file, or holds no points.
     """
     pxr = library()
     try:
@@ -345,7 +338,7 @@ def forest_steps(order: Import, mix: Mapping[str, float]) -> Steps:
     made: list[bpy.types.Object] = []
     whole, missing, number = False, [], 0
     try:
-        for name, data, points in read_parts(order.path):
+        for name, data, points in _read_parts(order.path):
             if data and int(data.get("format", 0)) > FORMAT:
                 raise SceneError(f"{order.what}was written by a newer TetFlora; update the extension")
             if data:  # species that it counts through, each with the name of the object of its form

@@ -18,6 +18,7 @@ from pathlib import Path
 
 import bpy
 import numpy as np
+from bpy.types import Collection, Image, Material, Object, Scene
 from numpy.typing import NDArray
 
 from ...arrays import Floats, Integers
@@ -130,8 +131,7 @@ def _png(path: Path) -> Raster:
     return replace(place_of_image(path), values=values)
 
 
-def _loaded(path: Path, unreadable: str) -> bpy.types.Image:
-    """An image of a file."""
+def _loaded(path: Path, unreadable: str) -> Image:
     try:
         return bpy.data.images.load(str(path), check_existing=False)
     except RuntimeError:
@@ -205,7 +205,7 @@ def _photo_place(path: Path, ground: System) -> Raster:
     return place if place.system.epsg else replace(place, system=ground)
 
 
-def _photo_material(path: Path, cells: Floats) -> tuple[bpy.types.Material, Floats, int]:
+def _photo_material(path: Path, cells: Floats) -> tuple[Material, Floats, int]:
     """A material of an image, UV (n, 2) of places in its pixels (n, 2), and how many of these lie beside it."""
     unreadable = "Blender cannot read this image; write it as JPEG, PNG or 8-bit TIFF"
     image = _loaded(path, unreadable)
@@ -225,9 +225,7 @@ def _photo_material(path: Path, cells: Floats) -> tuple[bpy.types.Material, Floa
     return material, np.stack([cells[:, 0], size[1] - cells[:, 1]], axis=1) / size, int((~inside).sum())
 
 
-def _mesh(
-    name: str, points: NDArray, faces: NDArray, uv: NDArray, material: bpy.types.Material | None
-) -> bpy.types.Object:
+def _mesh(name: str, points: NDArray, faces: NDArray, uv: NDArray, material: Material | None) -> Object:
     """A smooth mesh with UV; soil if it has no material."""
     middle = np.round((points.min(axis=0) + points.max(axis=0)) / 2.0)
     middle[2] = 0.0
@@ -326,7 +324,7 @@ def outline_steps(order: Import, kind: str = "") -> Steps:
     return Imported(None, [f"Outlines imported: {told}", *notes, f"coordinates: {system.name}"])
 
 
-def building_areas(scene: bpy.types.Scene) -> list[Floats]:
+def building_areas(scene: Scene) -> list[Floats]:
     """Borders (k, 2) of the buildings that were imported into a scene, in world space."""
     return [
         (members(spline.points, "co", 4).astype(np.float64) @ np.array(obj.matrix_world).T)[:, :2]
@@ -336,7 +334,7 @@ def building_areas(scene: bpy.types.Scene) -> list[Floats]:
     ]
 
 
-def _remove(collections: list[bpy.types.Collection]) -> None:
+def _remove(collections: list[Collection]) -> None:
     """Take back what was drawn."""
     objects = [obj for collection in collections for obj in collection.objects]
     curves = [obj.data for obj in objects]
@@ -345,7 +343,7 @@ def _remove(collections: list[bpy.types.Collection]) -> None:
     bpy.data.batch_remove([*curves, *(material for material in materials if not material.users)])
 
 
-def _curve(outline: MapFeature, rings: list[Floats], heights: HeightGrid | None) -> bpy.types.Object:
+def _curve(outline: MapFeature, rings: list[Floats], heights: HeightGrid | None) -> Object:
     """One outline as an object; its points count from its first one, so that far ones are exact."""
     data = bpy.data.curves.new(outline.name, 'CURVE')
     filled = outline.closed and outline.kind in (WATER, BUILDING)
@@ -385,11 +383,11 @@ def _curve(outline: MapFeature, rings: list[Floats], heights: HeightGrid | None)
     return obj
 
 
-def _look(kind: str) -> bpy.types.Material:
+def _look(kind: str) -> Material:
     """The material of water, buildings or roads; that of an earlier import if there is one."""
     name, color, rough = _LOOKS[kind]
 
-    def build(graph: Graph, material: bpy.types.Material) -> None:
+    def build(graph: Graph, material: Material) -> None:
         material.diffuse_color = (*color, 1.0)
         surface = graph.node("ShaderNodeBsdfPrincipled", {"Base Color": (*color, 1.0), "Roughness": rough})
         graph.node("ShaderNodeOutputMaterial", {"Surface": surface})

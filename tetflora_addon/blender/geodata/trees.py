@@ -276,11 +276,9 @@ def canopy_steps(order: Import, mix: Mapping[str, float], least: float, below: P
     along, down = along - middle, down - middle
     cell = float(np.sqrt(abs(along[0] * down[1] - along[1] * down[0])))
     if roofs := building_areas(order.scene):
-        flat_cells = replace(raster, corner=middle - along * (w // 2) - down * (h // 2), along=along, down=down)
-        flat_cells, number = yield from call_in_thread(
-            Progress(0.1, "Leaving out roofs"), without_areas, flat_cells, roofs
-        )
-        raster = replace(raster, values=flat_cells.values)
+        flat = replace(raster, corner=middle - along * (w // 2) - down * (h // 2), along=along, down=down)
+        flat, number = yield from call_in_thread(Progress(0.1, "Leaving out roofs"), without_areas, flat, roofs)
+        raster = replace(raster, values=flat.values)
         notes += [f"{number:,} cells on buildings left out"] * (number > 0)
     if cell > _COARSEST:
         raise SceneError(f"{what}its cells are {cell:.1f} m wide; trees can be told apart up to {_COARSEST:g} m")

@@ -99,15 +99,10 @@ def _columns(
     return x, np.clip(first, 0, columns - 1), np.clip(second, 0, columns - 1)
 
 
-def pyramid_of(image: bpy.types.Image, weighted: bool, most: int = MOST_TEXELS) -> Pyramid | None:
-    """The pyramid of an image; None if it has no pixels.
+def _pyramid_of(image: bpy.types.Image, weighted: bool, most: int) -> Pyramid | None:
+    """The pyramid of an image, of about so many columns or rows at most; None if it has no pixels.
 
-    Parameters
-    ----------
-    weighted : bool
-        Whether its alpha counts: coarser copies then have the color of what is not transparent.
-    most : int
-        If less than `MOST_TEXELS`, only about as many columns or rows are looked at.
+    Where its alpha counts, coarser copies have the color of what is not transparent.
     """
     if not (all(image.size) and image.channels):
         return None
@@ -415,7 +410,7 @@ class FaceReader:
     Parameters
     ----------
     most : int
-        See `pyramid_of`.
+        See `_pyramid_of`.
     """
 
     def __init__(self, most: int = MOST_TEXELS) -> None:
@@ -425,12 +420,12 @@ class FaceReader:
         self._pyramids: dict[tuple[bpy.types.Image, bool], Pyramid | None] = {}
 
     def pyramid(self, image: bpy.types.Image, weighted: bool) -> Pyramid | None:
-        """The pyramid of an image, see `pyramid_of`."""
+        """The pyramid of an image, see `_pyramid_of`."""
         key = image, weighted
         if key not in self._pyramids:
             if sum(p.texels.nbytes for p in self._pyramids.values() if p is not None) > _MOST_BYTES:
                 self._pyramids.clear()
-            self._pyramids[key] = pyramid_of(image, weighted, self._most)
+            self._pyramids[key] = _pyramid_of(image, weighted, self._most)
         return self._pyramids[key]
 
     def prepare(self, mesh: bpy.types.Mesh, materials: list[bpy.types.Material | None]) -> "MeshLooks":

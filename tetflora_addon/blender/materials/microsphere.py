@@ -282,11 +282,9 @@ def shell_group() -> bpy.types.NodeTree:
     return node_group(SHELL, _GROUP_VERSION, inputs, ENGINES, build)
 
 
-def baked_shell_group() -> bpy.types.NodeTree:
+def _baked_shell_group() -> bpy.types.NodeTree:
     """The group "TetFlora Baked Shell": light that a cell gives off, and how much of what is behind passes through.
 
-    Notes
-    -----
     With constant density, and the scattered radiance J linear between where the ray enters (J₀) and leaves (J₁), a
     cell of optical depth τ = κℓ adds B = w₀ J₀ + w₁ J₁ to T = e^{−τ} times what is behind it (paper, section 7), where
     w₁ = (1 − e^{−τ}(1 + τ)) / τ and w₀ = 1 − (1 − e^{−τ}) / τ.
@@ -328,7 +326,7 @@ def shell_material() -> bpy.types.Material:
 
 def baked_shell_material() -> bpy.types.Material:
     """Material "TetFlora baked shell": the light of ``shell_buffers(light=...)``, without noise, unlit."""
-    return surface_material(BAKED_SHELL_MATERIAL, _BAKED_VERSION, _builder(baked_shell_group))
+    return surface_material(BAKED_SHELL_MATERIAL, _BAKED_VERSION, _builder(_baked_shell_group))
 
 
 def _builder(group: Any) -> Any:

@@ -73,9 +73,8 @@ class Standing:
         self.fields = fields_of(found)
         places = [np.array([o.matrix_world.translation for o in self.objects], np.float64).reshape(-1, 3)]
         source, number = [np.full(len(self.objects), _OBJECTS)], [np.arange(len(self.objects))]
-        removable = [
-            np.array([o.library is None and o.override_library is None and o.visible_get() for o in self.objects], bool)
-        ]
+        free = [o.library is None and o.override_library is None and o.visible_get() for o in self.objects]
+        removable = [np.array(free, bool)]
         for index, field in enumerate(self.fields):
             own = plant_objects.editable(field)
             if own:

@@ -185,10 +185,7 @@ def digest(values: list[Any]) -> str:
 
 @lru_cache(maxsize=1)
 def _defaults(kind: type[PropertyGroup]) -> tuple[tuple[str, Any], ...]:
-    """Names and defaults of settings that are single values; kept, because panels ask at every redraw.
-
-    Of the distance counts what it is, and not where it comes from.
-    """
+    """Names and defaults of settings that are single values, with the distance itself; panels ask at every redraw."""
     simple = [p for p in settings_of(kind) if p.type != 'COLLECTION' and p.identifier != "distance_by_species"]
     return tuple((p.identifier, None if p.type == 'POINTER' else p.default) for p in simple)
 

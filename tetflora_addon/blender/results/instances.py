@@ -181,9 +181,7 @@ def _held(results: Results, name: str, source: Source, matrices: NDArray[np.floa
     return made
 
 
-def _instancer(
-    name: str, source: Source, matrices: NDArray[np.floating], ids: Integers, pick: Integers32 | None = None
-) -> Object:
+def _instancer(name: str, source: Source, matrices: NDArray, ids: Integers, pick: Integers32 | None = None) -> Object:
     """An object in no collection whose nodes show instances of a source, or of objects picked from a collection."""
     kind = 'COLLECTION' if isinstance(source, Collection) else 'OBJECT'
     kind = kind if pick is None else 'CHILDREN'
@@ -211,10 +209,8 @@ def _group(kind: str) -> NodeTree:
             inputs = {"Object": given[_SOURCE], "As Instance": True}
             shown = graph.outputs("GeometryNodeObjectInfo", inputs, transform_space='ORIGINAL')["Geometry"]
         else:
-            inputs = {
-                "Collection": given[_SOURCE],
-                **dict.fromkeys(("Separate Children", "Reset Children"), kind == 'CHILDREN'),
-            }
+            apart = dict.fromkeys(("Separate Children", "Reset Children"), kind == 'CHILDREN')
+            inputs = {"Collection": given[_SOURCE], **apart}
             shown = graph.outputs("GeometryNodeCollectionInfo", inputs, transform_space='ORIGINAL')["Instances"]
         # Points lose their matrices, or instances would keep them as well. Only here: to remove them from instances, or
         # to do anything to what these show, would turn objects into plain geometry.

@@ -288,9 +288,8 @@ class AssetMeshes:
         self.surface = np.asarray(surface, np.int32)
         self.matrices = np.asarray(matrices, np.float64).reshape(-1, 4, 4)
         rows = self.matrices[:, :3, :3].transpose(0, 2, 1)
-        a, b, c = rows[:, 0], rows[:, 1], rows[:, 2]
         self.mirrored = np.linalg.det(rows) < 0.0
-        turned = np.stack([np.cross(b, c), np.cross(c, a), np.cross(a, b)], axis=1)
+        turned = np.cross(np.roll(rows, -1, axis=1), np.roll(rows, -2, axis=1))
         #: (n, 3, 3): a row vector times this is a normal in the space of the asset, of any length.
         self.cofactors = turned * np.where(self.mirrored, -1.0, 1.0)[:, None, None]
         self.moved = (self.matrices != np.eye(4)).any(axis=(1, 2))
