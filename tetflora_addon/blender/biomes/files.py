@@ -65,11 +65,8 @@ class Biome:
 def stand_settings() -> list[str]:
     """Names of settings of stands that mean something in any file."""
     numbers = [p.identifier for p in TetFloraStand.bl_rna.properties if p.type in {'INT', 'FLOAT', 'BOOLEAN'}]
-    return [
-        name
-        for name in numbers
-        if name not in ("is_grown", "last_year", "plants", "species_index", "path_distance", "limits_shown")
-    ]
+    of_a_file = {"is_grown", "last_year", "plants", "species_index", "path_distance", "limits_shown"}
+    return [name for name in numbers if name not in of_a_file]
 
 
 def read_biome(path: Path) -> Biome:

@@ -140,12 +140,9 @@ def _by_height(bark: MeshBuffers, rows: Floats, girth: float) -> MeshBuffers:
     sums = np.concatenate([[0.0], np.cumsum(rows[:top]) / top * _ABOVE])
     on = float(rows[top:].mean())
     first, v = bark.face_offsets[:-1], bark.attributes["UVMap"][1][:, 1]
-    low, high = (each.reduceat(v, first).astype(np.float64) for each in (np.minimum, np.maximum))
-    below, whole = (
-        np.interp(end, np.linspace(0.0, _ABOVE, top + 1), sums)
-        + on * (np.maximum(end - _ABOVE, 0.0) + np.minimum(end, 0.0))
-        for end in (low, high)
-    )
+    low, high = ends = np.stack([each.reduceat(v, first) for each in (np.minimum, np.maximum)]).astype(np.float64)
+    beyond = np.maximum(ends - _ABOVE, 0.0) + np.minimum(ends, 0.0)
+    below, whole = np.interp(ends, np.linspace(0.0, _ABOVE, top + 1), sums) + on * beyond
     factor = (whole - below) / np.maximum(high - low, 1e-9)
     factor = np.where((bark.attributes["tf_girth"][1] > girth / 2.0) & (high > low), factor, 1.0)[:, None]
     color = np.clip(bark.attributes["tf_color"][1] * factor, 0.0, 1.0).astype(np.float32)

@@ -108,7 +108,12 @@ def _write_part(pxr: SimpleNamespace, stage: object, path: str, part: ForestPart
     instancer.CreateOrientationsAttr(_array(pxr, "Quath", part.rotation.astype(np.float16)))
     instancer.CreateScalesAttr(_array(pxr, "Vec3f", np.repeat(part.scale[:, None], 3, axis=1)))
     primvars = pxr.UsdGeom.PrimvarsAPI(instancer)
-    columns = _columns(part)
+    columns = {
+        "species": ('INT', part.species),
+        "seed": stored_seeds(part.seed),
+        "age": ('FLOAT', part.age),
+        "height": ('FLOAT', part.height),
+    }
     for name, (kind, values) in columns.items():
         _add(pxr, primvars, name, kind, values)
     known = {"position": ('FLOAT_VECTOR', part.position), **{name: columns[name] for name in ("seed", "species")}}
@@ -134,16 +139,6 @@ def _write_part(pxr: SimpleNamespace, stage: object, path: str, part: ForestPart
             },
         },
     )
-
-
-def _columns(part: ForestPart) -> dict[str, tuple[str, NDArray]]:
-    """What every plant is, for whoever reads the file."""
-    return {
-        "species": ('INT', part.species),
-        "seed": stored_seeds(part.seed),
-        "age": ('FLOAT', part.age),
-        "height": ('FLOAT', part.height),
-    }
 
 
 def stored_seeds(seed: Integers) -> tuple[str, NDArray[np.int32]]:

@@ -9,7 +9,7 @@ the slope of u along the surface, which Bump nodes know.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from math import tau
 from typing import Any
 
@@ -220,14 +220,13 @@ def bark_group(character: str) -> bpy.types.NodeTree:
 
 def pattern_part(graph: Graph, character: str, place: Place) -> dict[str, Term]:
     """Group "TetFlora <Character> Bark Pattern": Tone, factors of the color, and Height, in widths of a feature."""
-    given = {field.name: getattr(place, field.name) for field in fields(place)}
 
     def build(inner: Graph, terms: dict[str, Term]) -> dict[str, Any]:
-        tone, height = _bark(character).pattern(inner, Place(**{name: terms[name.title()] for name in given}))
+        tone, height = _bark(character).pattern(inner, Place(**{name.lower(): term for name, term in terms.items()}))
         return {"Tone": tone, "Height": height}
 
     name = f"TetFlora {character.capitalize()} Bark Pattern"
-    inputs = {name.title(): term for name, term in given.items()}
+    inputs = {name.title(): term for name, term in vars(place).items()}
     return graph.part(name, _VERSION, inputs, (("Tone", 'Color'), ("Height", 'Float')), build)
 
 
