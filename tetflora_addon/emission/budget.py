@@ -92,8 +92,6 @@ def fit_to_budget(
 
     Parameters
     ----------
-    result : Refinement
-        Of the loop.
     faces : float, optional
         Faces of each proxy tetrahedron; by default proxies are facets or spheres, whose number follows their size.
     times : float

@@ -51,10 +51,8 @@ def read_tiff(path: Path) -> Job[Raster]:
 
     Raises
     ------
-    OSError
-        It cannot be read.
-    SceneError
-        It is broken, or of a kind that cannot be used; names the tag.
+    OSError, SceneError
+        It cannot be read, is broken, or of a kind that cannot be used; names the tag.
     """
     check_regular(path)
     with path.open("rb") as file:

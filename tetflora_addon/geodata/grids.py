@@ -29,10 +29,8 @@ def read_grid(path: Path) -> Job[Raster]:
 
     Raises
     ------
-    OSError
-        It cannot be read.
-    SceneError
-        It is broken; names the line or tag.
+    OSError, SceneError
+        It cannot be read, or is broken; names the line or tag.
     """
     ending = path.suffix.lower()
     if ending in (".tif", ".tiff"):

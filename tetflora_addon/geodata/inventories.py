@@ -220,10 +220,8 @@ def read_inventory(
 
     Raises
     ------
-    OSError
-        It cannot be read.
-    SceneError
-        It is broken; names line or feature, and column.
+    OSError, SceneError
+        It cannot be read, or is broken; names line or feature, and column.
     """
     table_ = _table(path, skip, epsg=epsg)
     return _Reading(table_, units, skip, _chosen(table_, columns or {})).inventory(epsg)
@@ -234,10 +232,8 @@ def preview(path: Path) -> list[Column]:
 
     Raises
     ------
-    OSError
-        It cannot be read.
-    SceneError
-        It is broken.
+    OSError, SceneError
+        It cannot be read, or is broken.
     """
     table_ = _table(path, True, _PREVIEWED, PLAIN)
     taken = taken_for(table_, {})

@@ -45,10 +45,8 @@ def read_features(path: Path, chosen: int = 0) -> tuple[list[_Feature], System]:
 
     Raises
     ------
-    OSError
-        It cannot be read.
-    SceneError
-        It is broken; names the feature.
+    OSError, SceneError
+        It cannot be read, or is broken; names the feature.
     """
     name = path.name
     if path.suffix.lower() in (".shp", ".gpkg"):

@@ -71,10 +71,8 @@ def read_outlines(path: Path, epsg: int = 0, kind: str = "") -> tuple[list[MapFe
 
     Raises
     ------
-    OSError
-        It cannot be read.
-    SceneError
-        It is broken, or has no outlines; names the feature.
+    OSError, SceneError
+        It cannot be read, is broken, or has no outlines; names the feature.
     """
     features, system = read_features(path, epsg)
     found: list[MapFeature] = []

@@ -163,10 +163,8 @@ def read_ascii(path: Path) -> Job[Raster]:
 
     Raises
     ------
-    OSError
-        It cannot be read.
-    SceneError
-        It is broken; names the line.
+    OSError, SceneError
+        It cannot be read, or is broken; names the line.
     """
     content = read_whole(path, MAX_TEXT)
     name, header, start = path.name, {}, 0

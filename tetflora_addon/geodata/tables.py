@@ -65,10 +65,8 @@ def read_csv(path: Path, skip: bool = False, most: int | None = None) -> Table:
 
     Raises
     ------
-    OSError
-        It cannot be read.
-    SceneError
-        It is broken; names the line.
+    OSError, SceneError
+        It cannot be read, or is broken; names the line.
     """
     content = read_whole(path, MAX_BYTES)
     name = path.name
@@ -127,10 +125,8 @@ def read_points(path: Path, _skip: bool = False, most: int | None = None, chosen
 
     Raises
     ------
-    OSError
-        It cannot be read.
-    SceneError
-        It is broken; names the feature.
+    OSError, SceneError
+        It cannot be read, or is broken; names the feature.
     """
     features, system = read_features(path, chosen)
     name, without = path.name, 0

@@ -259,13 +259,11 @@ def project(vertices: Floats, extinction: Floats, camera: Camera) -> Projected:
         Of either orientation, meters, world space, all `drawable`. In the order in which they are to be drawn.
     extinction : (n,) float64
         κ ≥ 0, 1/m.
-    camera : Camera
-        Perspective or orthographic; panoramas have no straight edges.
 
     Raises
     ------
     ValueError
-        If the camera is a panorama.
+        The camera is a panorama, where no edges are straight.
     """
     if camera.kind == "PANO":
         raise ValueError("a panorama bends the edges of tetrahedra; use a perspective or orthographic camera")

@@ -177,8 +177,6 @@ def fitting(flora: Flora, number: int, rays: float = np.inf) -> Generator[float,
 
     Parameters
     ----------
-    number : int
-        Index of the species.
     rays : float
         Blocked rays that each weight is to follow from, about; the lattice is made coarser where there are more.
 
@@ -484,10 +482,6 @@ def weights_of(flora: Flora, number: int, states: tuple[int, ...], known: Known)
 
     Parameters
     ----------
-    flora : Flora
-        In summer.
-    number : int
-        Index of the species.
     states : tuple of int
         Indices of `SHARES`.
     known : callable

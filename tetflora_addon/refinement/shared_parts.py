@@ -253,7 +253,7 @@ OPEN_BATCH = 40_000
 _START, _ASSET_START = 221, 251
 
 
-def share_points(
+def _share_points(
     flora: Flora,
     parts: PlantParts,
     pixels: Floats,
@@ -262,21 +262,10 @@ def share_points(
     along: Integers | int = 0,
     room: int = MOST_BEYOND,
 ) -> SharePoints:
-    """Points on parts of plants, all in the root.
+    """Points on sub-plants that so many pixels (n,) show, or with ``lines`` on branches alone; all in the root.
 
-    Parameters
-    ----------
-    parts : PlantParts of n
-        Sub-plants, or if ``lines`` are given branches alone.
-    pixels : (n,) float64
-        Extent of the parts in the image.
-    lines : Axes of n, optional
-    times : int
-        How many times as many points as usual.
-    along : (n,) int64, optional
-        Points on the wood of branches alone at least.
-    room : int, optional
-        Points on leaves that all of them have at most, beyond the fewest.
+    They are so many times as many as usual, on wood of branches alone at least as many as ``along`` (n,), and on leaves
+    of all at most as many as there is ``room`` for beyond the fewest.
     """
     solid = are_solids(flora.rows)[parts.branches.row]
     squares = np.clip((pixels / PIXELS_IN_SOLID) ** 2, FEWEST_IN_SOLID, MOST_IN_SOLID)
@@ -406,7 +395,7 @@ class SharedPlants(SharedParts[PlantParts]):
         if lines is not None:
             along = parts.branches.length / np.maximum(2.0 * APART * parts.branches.radius, 1e-300)
             along = np.where(self.thick(parts), np.minimum(along, MOST_ALONG), 0.0).astype(np.int64)
-        made = share_points(self.flora, parts, self.pixels(parts), lines, self._times, along, self._room)
+        made = _share_points(self.flora, parts, self.pixels(parts), lines, self._times, along, self._room)
         self._room -= min(self._room, max(len(made) - self._times * FEWEST * len(parts), 0))
         return made
 

@@ -52,8 +52,6 @@ def summarize(
     ----------
     index : (nodes,) int
         Number of the summary that each node of the tree contributes to; contents of nodes with −1 are skipped.
-    count : int
-        Number of summaries.
     assets : PlacedAssets, Held of AssetParts, optional
         Clusters of instances, from `SharedAssets.held`.
     """

@@ -17,7 +17,7 @@ from tests.engine import support
 from tetflora_addon.camera.camera import Camera
 from tetflora_addon.emission.shells import set_apart
 from tetflora_addon.light import buffers
-from tetflora_addon.light.illumination import Illumination, Sources, Surfaces, shadow_steps
+from tetflora_addon.light.illumination import Illumination, Sources, Surfaces, _shadow_steps
 from tetflora_addon.light.receivers import MediumCells, SurfaceElements
 from tetflora_addon.light.scattering import (
     DIRECTIONS,
@@ -48,7 +48,7 @@ def shadow_pass(
     """All steps of the pass at once; ``ground`` is the color of the occluders."""
     occluders = np.zeros((0, 3, 3)) if occluders is None else occluders
     sources = Sources(lights, world, occluders, np.array(options.pop("ground", (0.0, 0.0, 0.0))))
-    steps = shadow_steps(cells, sources, **options)
+    steps = _shadow_steps(cells, sources, **options)
     while True:
         try:
             next(steps)

@@ -493,18 +493,17 @@ def read_places(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> list[
         A transform that is not a number, a species whose collection has no object with faces, or a marked object of a
         kind that cannot be read; the message names the object.
     """
-    found = plant_places(scene, depsgraph)
+    found = _plant_places(scene, depsgraph)
     marked = sorted((o for o in renderable_objects(depsgraph.view_layer) if is_scatter(o)), key=lambda o: o.name_full)
     for scatter in read_scatters(marked, depsgraph).values():
         found += scatter.places
     return found
 
 
-def plant_places(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> list[Places]:
+def _plant_places(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> list[Places]:
     """Places of plants whose species is an asset, by the variants of each.
 
     An object stands as it is turned and scaled in the scene, at the place of the plant instead of its own.
-    Errors are those of `read_places`.
     """
     read = read_asset_plants(scene, depsgraph)
     species = asset_species(scene)

@@ -97,17 +97,13 @@ class Parser(argparse.ArgumentParser):
 
 
 def main(arguments: Sequence[str]) -> int:
-    """Run one command on the open file.
+    """Run one command on the open file; returns the exit code, see above.
 
     Parameters
     ----------
     arguments : sequence of str
         What follows ``--command tetflora``.
 
-    Returns
-    -------
-    int
-        Exit code, see above.
     """
     return run(_parser(), arguments)
 

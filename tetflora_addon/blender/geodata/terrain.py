@@ -64,10 +64,8 @@ def read_raster(order: Import, path: Path | None = None) -> Job[Raster]:
 
     Raises
     ------
-    OSError
-        One cannot be read.
-    SceneError
-        One is broken, or lacks a place.
+    OSError, SceneError
+        One cannot be read, is broken, or lacks a place.
     """
     tiles, paths, code = [], [order.path, *order.tiles] if path is None else [path], order.epsg
     for path in paths:

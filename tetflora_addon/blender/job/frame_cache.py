@@ -67,8 +67,6 @@ def scene_digest(
     ----------
     camera : Camera, optional
         Instead of the scene's current one.
-    given : Given, optional
-        From `read_scene` for the scene.
 
     Raises
     ------

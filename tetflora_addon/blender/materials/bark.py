@@ -154,11 +154,6 @@ def place_group() -> bpy.types.NodeTree:
 def bark_group(character: str) -> bpy.types.NodeTree:
     """The group "TetFlora <Character> Bark".
 
-    Parameters
-    ----------
-    character : str
-        One of `BARKS`.
-
     Returns
     -------
     bpy.types.NodeTree

@@ -128,7 +128,6 @@ class Graph:
 
     Parameters
     ----------
-    tree : bpy.types.NodeTree
     fresh : bool
         Whether it is emptied first.
     """

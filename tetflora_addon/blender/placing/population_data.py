@@ -70,8 +70,6 @@ def check_population(where: str, entry: Any) -> None:
     ----------
     where : str
         What messages call it.
-    entry : Any
-        Decoded.
     """
     simple = {p.identifier for p in simple_settings(TetFloraLayer)}
     check_keys(where, entry, {"name"}, {"kind", "name", "grounds", "species", *simple})

@@ -96,14 +96,8 @@ def zone_values(scene: Scene, population: PropertyGroup) -> list[Any]:
     return values if len(values) > 1 or is_limited(biome) else []
 
 
-def read_zones(depsgraph: Depsgraph, population: PropertyGroup, grounds: Sequence[Object]) -> tuple[Zone, ...]:
-    """Zones that limit a population on its grounds: its biome's, and the inverse of those to which that gives way.
-
-    Raises
-    ------
-    SceneError
-        A mask or a path cannot be read, as the message says.
-    """
+def _read_zones(depsgraph: Depsgraph, population: PropertyGroup, grounds: Sequence[Object]) -> tuple[Zone, ...]:
+    """Zones that limit a population on its grounds: its biome's, and the inverse of those to which that gives way."""
     biome = biome_of(depsgraph.scene, population)
     if biome is None:
         return ()
@@ -115,9 +109,12 @@ def read_zones(depsgraph: Depsgraph, population: PropertyGroup, grounds: Sequenc
 def zoned(depsgraph: Depsgraph, owner: PropertyGroup, grounds: Sequence[Object], ground: Terrain) -> Terrain:
     """A ground with the zones of a layer, a population or a stand, in its weights: as they are at the corners.
 
-    Errors are those of `read_zones`.
+    Raises
+    ------
+    SceneError
+        A mask or a path cannot be read, as the message says.
     """
-    zones = read_zones(depsgraph, owner, grounds)
+    zones = _read_zones(depsgraph, owner, grounds)
     if not zones:
         return ground
     corners, count = ground.triangles, len(ground.triangles)
@@ -421,7 +418,7 @@ def read_search(
         above = canopy_of(scene, depsgraph)
     suits = read_suits(population, ground.triangles, species, above)
     present = standing(depsgraph, own, species)
-    zones = read_zones(depsgraph, population, grounds)
+    zones = _read_zones(depsgraph, population, grounds)
     erased = (  # circles, as lines of one point
         Path(center[None], stroke[0])
         for stroke in _strokes(population)

@@ -155,8 +155,6 @@ def read_ground(
 
     Parameters
     ----------
-    objects : iterable of bpy.types.Object
-        Meshes.
     vertex_group : str
         Group whose weights define how suitable the ground is; every mesh needs it, or a float attribute of its name.
     image : bpy.types.Image, optional

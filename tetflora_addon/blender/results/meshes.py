@@ -33,7 +33,7 @@ _DOMAINS = ("POINT", "FACE", "CORNER")
 
 
 def write_mesh(name: str, buffers: MeshBuffers, materials: Sequence[bpy.types.Material | None] = ()) -> bpy.types.Mesh:
-    """Make a mesh datablock from buffers.
+    """Make a mesh datablock from buffers, not linked to any object.
 
     Topology is copied, edges included, so that Blender computes nothing; where buffers have none it finds them.
     Positions and indices are written through the mesh's attributes, which are plain memory; the collections
@@ -41,18 +41,9 @@ def write_mesh(name: str, buffers: MeshBuffers, materials: Sequence[bpy.types.Ma
 
     Parameters
     ----------
-    name : str
-        Name of the new datablock; Blender appends a number where it is taken.
     buffers : MeshBuffers
         The mesh, see ``docs/architecture.md``. ``UVMap`` becomes the UV map; an INT attribute ``material_index`` on
         ``'FACE'`` chooses among `materials`.
-    materials : sequence of bpy.types.Material or None
-        Material slots in their order.
-
-    Returns
-    -------
-    bpy.types.Mesh
-        Not linked to any object.
 
     Raises
     ------
@@ -148,13 +139,6 @@ def _check_range(key: str, indices: NDArray, count: int) -> None:
 
 def point_object(name: str, buffers: PointBuffers, material: bpy.types.Material) -> bpy.types.Object:
     """Make an object of points that render as spheres, not linked to any collection.
-
-    Parameters
-    ----------
-    name : str
-        Name of the new datablocks; Blender appends a number where it is taken.
-    material : bpy.types.Material
-        Of all points.
 
     Returns
     -------
@@ -344,8 +328,6 @@ def cluster_mesh_steps(
 
     Parameters
     ----------
-    name : str
-        Of the mesh.
     part, face : (k,) int32
         Faces of parts, by their number in the mesh of the part's surface.
 

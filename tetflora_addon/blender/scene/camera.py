@@ -290,20 +290,13 @@ def view_camera(scene: Scene) -> Camera | None:
         return None
     space, region = found
     view, projection = (np.array(m, np.float64) for m in (space.region_3d.view_matrix, space.region_3d.window_matrix))
-    return camera_of(view, projection, (space.clip_start, space.clip_end), (region.width, region.height))
+    return _camera_of(view, projection, (space.clip_start, space.clip_end), (region.width, region.height))
 
 
-def camera_of(view: Floats, projection: Floats, clip: tuple[float, float], size: tuple[int, int]) -> Camera:
-    """The camera of the matrices that OpenGL draws with.
+def _camera_of(view: Floats, projection: Floats, clip: tuple[float, float], size: tuple[int, int]) -> Camera:
+    """The camera of the matrices (4, 4) that OpenGL draws with, to camera space and on to the cube that is drawn.
 
-    Parameters
-    ----------
-    view, projection : (4, 4) float64
-        From world to camera space, and from there to the cube that is drawn.
-    clip : tuple of float
-        Near and far clipping depths, meters. Orthographic views also show what is as far behind them.
-    size : tuple of int
-        Pixels.
+    Orthographic views show as far behind them as before them.
     """
     to_world = np.linalg.inv(view)
     frame = to_world[:3, :3] / np.linalg.norm(to_world[:3, :3], axis=0)

@@ -484,8 +484,6 @@ def read_aged_field(
 
     Parameters
     ----------
-    obj : bpy.types.Object
-        Original object.
     depsgraph : bpy.types.Depsgraph
         Applies modifiers. A field that it does not evaluate is read without them.
     matrices : (k, 4, 4) float64

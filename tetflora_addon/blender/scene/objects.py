@@ -417,12 +417,7 @@ def _triangles(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Floats:
 
 
 def read_occluders(depsgraph: bpy.types.Depsgraph) -> Floats:
-    """Triangles of all occluders of a view layer that render.
-
-    Returns
-    -------
-    (t, 3, 3) float64
-        Corners in world space, meters; ``(0, 3, 3)`` if there are none.
+    """Triangles (t, 3, 3) of all occluders of a view layer that render, in world space, meters.
 
     Raises
     ------
