@@ -28,10 +28,9 @@ from ...export.levels import PlantLevel
 from ...growth.hashing import child_key, key_of_seed, uniform
 from ...jobs import Progress
 from ...planting.rules import species_by_weight
-from ..attributes import write
 from ..compat import usd
 from ..geodata.origin import Import, Imported, Steps, importing
-from ..placing.plant_objects import link_field
+from ..placing.plant_objects import link_field, write_points
 
 #: In the custom data of an instancer, and the prefix of primvars.
 KEY, PREFIX = "tetflora", "tetflora:"
@@ -374,10 +373,7 @@ def _completed(points: PointAttributes, mix: Mapping[str, float]) -> tuple[Point
 def _field(name: str, data: Mapping, points: PointAttributes, kinds: list[tuple[str, str]]) -> bpy.types.Object:
     """A field that is in no collection yet."""
     mesh = bpy.data.meshes.new(name)
-    mesh.vertices.add(len(points["position"][1]))
-    for key, (kind, values) in points.items():
-        write(mesh, key, values, data_type=kind)
-    mesh.update()
+    write_points(mesh, points)
     obj = bpy.data.objects.new(name, mesh)
     group = obj.tetflora
     if data:

@@ -138,7 +138,7 @@ def _loaded(path: Path, unreadable: str) -> Image:
 
 @importing
 def terrain_steps(order: Import, most: int, image: Path | None = None) -> Steps:
-    """Make ground; yields progress. Closing the steps leaves all as it was.
+    """Make ground; see `importing`.
 
     Parameters
     ----------
@@ -146,11 +146,6 @@ def terrain_steps(order: Import, most: int, image: Path | None = None) -> Steps:
         Faces.
     image : Path, optional
         An orthophoto, which becomes its color.
-
-    Raises
-    ------
-    SceneError
-        The file is broken, or cannot lie in this scene.
     """
     raster = yield from read_raster(order)
     photo = None if image is None else _photo_place(image, raster.system)
@@ -273,17 +268,12 @@ BUILDING_MARK = "tetflora_building"
 
 @importing
 def outline_steps(order: Import, kind: str = "") -> Steps:
-    """Make curves of the outlines in a file; yields progress. Closing the steps leaves all as it was.
+    """Make curves of the outlines in a file; see `importing`.
 
     Parameters
     ----------
     kind : str
         What all are taken for; empty to tell them by their keys.
-
-    Raises
-    ------
-    SceneError
-        The file is broken, or cannot lie in this scene.
     """
     progress = Progress(0.0, f"Reading {order.path.name}")
     yield progress

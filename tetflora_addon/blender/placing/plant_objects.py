@@ -377,7 +377,7 @@ def positions(obj: Object) -> Floats:
 def take_points(obj: Object, keep: Mask) -> None:
     """Keep some of a field's points, (n,) bool, with all their attributes."""
     points = {name: (kind, values[keep]) for name, (kind, values) in _points(obj.data).items()}
-    _write(obj, points, int(keep.sum()))
+    write_points(own_mesh(obj), points)
 
 
 def add_points(obj: Object, placement: Placement, species: Sequence[str]) -> None:
@@ -411,14 +411,14 @@ def add_points(obj: Object, placement: Placement, species: Sequence[str]) -> Non
         "seed": placement.seed,
     }
     points, before = _points(obj.data), len(obj.data.vertices)
-    for name, kind in fields.FIELD_ATTRIBUTES.items():
-        if name not in points:
+    for name, kind in {"position": 'FLOAT_VECTOR', **fields.FIELD_ATTRIBUTES}.items():
+        if name not in points:  # of a mesh that never had any point, not even that
             points[name] = (kind, np.full((before, *own[name].shape[1:]), name == "scale", KINDS[kind].dtype))
     joined: Points = {}
     for name, (kind, values) in points.items():
         new = own.get(name, np.zeros((len(placement), *values.shape[1:])))
         joined[name] = (kind, np.concatenate([values, new.astype(values.dtype)]))
-    _write(obj, joined, before + len(placement))
+    write_points(own_mesh(obj), joined)
 
 
 def assign_field_species(obj: Object, identifier: str) -> bool:
@@ -473,10 +473,10 @@ def _points(mesh: Mesh) -> Points:
     return {one.name: (one.data_type, values_of(one)) for one in own}
 
 
-def _write(obj: Object, points: Points, number: int) -> None:
-    mesh = own_mesh(obj)
+def write_points(mesh: Mesh, points: Points) -> None:
+    """Give a mesh points alone, by the types and values (n) of their attributes."""
     mesh.clear_geometry()
-    mesh.vertices.add(number)
+    mesh.vertices.add(len(points["position"][1]))
     for name, (kind, values) in points.items():
         write(mesh, name, values, data_type=kind)
     mesh.update()
