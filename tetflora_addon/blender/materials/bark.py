@@ -122,15 +122,12 @@ class Knot:
     far: Term  # length of that; large where there is none
 
 
-def place_group() -> bpy.types.NodeTree:
+def _place_group() -> bpy.types.NodeTree:
     """The group "TetFlora Bark Place": where on a branch a point lies.
 
-    Returns
-    -------
-    bpy.types.NodeTree
-        Outputs Place, on the cylinder of radius 1 (in radii, moved by the branch's color), Turn, Along (radii), and
-        Perimeter, meters. The perimeter P is that of the branch where it is seen: a relief of height u times D tilts
-        the normal by θ with tan θ = D |∇u| = D / P (Mikkelsen 2010, "Bump mapping unparametrized surfaces on the GPU").
+    Outputs Place, on the cylinder of radius 1 (in radii, moved by the branch's color), Turn, Along (radii), and
+    Perimeter, meters. The perimeter P is that of the branch where it is seen: a relief of height u times D tilts
+    the normal by θ with tan θ = D |∇u| = D / P (Mikkelsen 2010, "Bump mapping unparametrized surfaces on the GPU").
     """
 
     def build(graph: Graph, _given: Any) -> dict[str, Any]:
@@ -182,7 +179,7 @@ def bark_group(character: str) -> bpy.types.NodeTree:
     )
 
     def build(graph: Graph, given: dict[str, Term]) -> dict[str, Any]:
-        where = graph.outputs("ShaderNodeGroup", node_tree=place_group())
+        where = graph.outputs("ShaderNodeGroup", node_tree=_place_group())
         girth = graph.attribute("tf_girth", "Fac")
         girth = (girth < 1e-6) * _USUAL + girth
         scale = given["Scale"] * (girth / _USUAL) ** bark.power

@@ -58,10 +58,8 @@ def _blade_kind(model: LeafModel, transmission: float, kind: str = "leaf") -> st
     if kind != "leaf":
         return "petal"
     outline = _outline(model)
-    if outline is not None and not outline.palmate:
-        return _simple(outline.width, outline.lobes > 0)
     if outline is not None:
-        return "palmate"
+        return "palmate" if outline.palmate else _simple(outline.width, outline.lobes > 0)
     width, length = _extent(model)
     if _leaflets(model, length):
         return "plain"
