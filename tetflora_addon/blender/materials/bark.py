@@ -214,7 +214,7 @@ def pattern_part(graph: Graph, character: str, place: Place) -> dict[str, Term]:
     """Group "TetFlora <Character> Bark Pattern": Tone, factors of the color, and Height, in widths of a feature."""
 
     def build(inner: Graph, terms: dict[str, Term]) -> dict[str, Any]:
-        tone, height = _bark(character).pattern(inner, Place(**{name.lower(): term for name, term in terms.items()}))
+        tone, height = _bark(character).pattern(inner, Place(**{name: terms[name.title()] for name in vars(place)}))
         return {"Tone": tone, "Height": height}
 
     name = f"TetFlora {character.capitalize()} Bark Pattern"
