@@ -118,7 +118,7 @@ def _of_states(flora: Flora, species: tuple[tuple[int, tuple[int, ...]], ...]) -
     number = 1 + max((state for _, states in species for state in states), default=0)
     weights = np.ones((2, number, len(flora.rows), len(COUNTS)))
     for one, states in species:
-        found = weights_of(flora, one, states, _known)
+        found = _weights_of(flora, one, states, _known)
         weights[:, : found.shape[1], flora.rows["species"] == one] = found
     return FacetWeights(*weights, are_solids(flora.rows))
 
@@ -473,20 +473,12 @@ def needed(flora: Flora, number: int) -> list[tuple[Flora, int]]:
         asked[some, one] = None
         return np.ones((2, int((some.rows["species"] == one).sum()), len(COUNTS)))
 
-    weights_of(flora.in_leaf, number, _states_of(flora, number), known)
+    _weights_of(flora.in_leaf, number, _states_of(flora, number), known)
     return list(asked)
 
 
-def weights_of(flora: Flora, number: int, states: tuple[int, ...], known: Known) -> Floats:
-    """Weights (2, s, r, k) of a species of a flora in summer, in some states; 1 in the others.
-
-    Parameters
-    ----------
-    states : tuple of int
-        Indices of `SHARES`.
-    known : callable
-        What was measured of those that are `needed`.
-    """
+def _weights_of(flora: Flora, number: int, states: tuple[int, ...], known: Known) -> Floats:
+    """Weights (2, s, r, k) of a species of a flora in summer, in some states of `SHARES`; 1 in the others."""
     own, rows = flora.species[number], flora.rows[flora.rows["species"] == number]
     out = np.ones((2, max(states) + 1, len(rows), len(COUNTS)))
     if own.aged is None:

@@ -289,17 +289,10 @@ def cell(graph: Graph, place: Term) -> Cell:
     return Cell(border, abs(graph.parts(normal)[2]), graph.parts(first["Color"]), place - first["Position"])
 
 
-def knot(graph: Graph, place: Place, size: float, noise: Term, apart: float = 1.0) -> Knot:
-    """Scars of shed branches: sparse, and the larger the thicker the branch.
+def _knot(graph: Graph, place: Place, size: float, noise: Term, apart: float = 1.0) -> Knot:
+    """Scars of shed branches, sparse and the larger the thicker the branch: the largest eye has so many of its radii.
 
-    Parameters
-    ----------
-    size : float
-        Of the largest eye, in radii of the branch.
-    noise : Vector
-        Around .5; what makes their outline uneven.
-    apart : float
-        More than 1: fewer of them.
+    A noise around .5 makes their outlines uneven. Those that are farther apart are fewer.
     """
     spacing = _KNOTS_APART * apart
     where = bent(place.round * (1.0 / spacing), noise, 0.35 * size / spacing)
@@ -344,7 +337,7 @@ def tones(graph: Graph, value: Term, stops: Tones) -> Term:
 def ridged(graph: Graph, place: Place) -> tuple[Term, Term]:
     """Ridges that part and meet, broken by cracks across every width or three, with deep fissures between them."""
     wave = graph.noise(times(place.cells, 0.35, 0.9), 1.0)[1]
-    eye = knot(graph, place, _EYE, wave)
+    eye = _knot(graph, place, _EYE, wave)
     where = bent(around(graph, place, eye, _EYE), wave, 2.0, 0.45)
     strip = cell(graph, where)
     grain = graph.noise(times(bent(place.cells, wave, 1.2), 2.6, 9.0), 3.0, 0.7)[0]
@@ -367,7 +360,7 @@ def ridged(graph: Graph, place: Place) -> tuple[Term, Term]:
 def interlaced(graph: Graph, place: Place) -> tuple[Term, Term]:
     """Short narrow strips that lie over each other like laths, with thin cracks between."""
     wave = graph.noise(times(place.cells, 0.45, 1.2), 1.0)[1]
-    eye = knot(graph, place, _EYE, wave)
+    eye = _knot(graph, place, _EYE, wave)
     strip = cell(graph, bent(around(graph, place, eye, _EYE), wave, 2.2, 0.4))
     grain = graph.noise(times(bent(place.cells, wave, 1.2), 1.9, 6.0), 3.0, 0.7)[0]
     lath = graph.step(grain * 0.22 + strip.border, 0.1, 0.22)
@@ -384,7 +377,7 @@ def netted(graph: Graph, place: Place) -> tuple[Term, Term]:
     count = place.scale * (0.55 * tau)
     slope = count / (place.stretch * tau)
     bend = graph.parts(wave)
-    eye = knot(graph, place, _EYE, wave)
+    eye = _knot(graph, place, _EYE, wave)
     angle = place.turn * tau
     tangent = graph.xyz(-graph.math('SINE', angle), graph.math('COSINE', angle))
     turn = place.turn + graph.vector('DOT_PRODUCT', aside(graph, eye, _EYE / tau), tangent)
@@ -440,7 +433,7 @@ def _plates(graph: Graph, place: Place) -> tuple[Term, Term, Term, Term]:
 def scaly(graph: Graph, place: Place) -> tuple[Term, Term]:
     """Small round scales that lift at their borders and lie over each other."""
     noise, wave = graph.noise(times(place.cells, 0.6, 0.6), 4.0, 0.7)
-    eye = knot(graph, place, _TWIG, wave)
+    eye = _knot(graph, place, _TWIG, wave)
     scale = cell(graph, bent(around(graph, place, eye, _TWIG), wave, 1.5))
     border = noise * 0.3 + scale.border
     solid, lifted = graph.step(border, 0.13, 0.24), graph.step(border, 0.42, 0.2)
@@ -478,7 +471,7 @@ def smooth(graph: Graph, place: Place) -> tuple[Term, Term]:
     noise, wave = graph.noise(times(place.round, 1.6, 1.1), 5.0, 0.62)
     lines = graph.noise(times(place.cells, 0.35, 0.8), 3.0, 0.6)[0]
     wrinkle = graph.step(lines, 0.57, 0.66) * graph.step(noise, 0.62, 0.42)
-    eye = knot(graph, place, _SCAR, wave, apart=0.9)
+    eye = _knot(graph, place, _SCAR, wave, apart=0.9)
     ring, hollow = lips(graph, eye)
     brow = _brows(graph, eye)
     marks = graph.math('MAXIMUM', brow * 0.7, hollow)
@@ -504,7 +497,7 @@ def pitted(graph: Graph, place: Place) -> tuple[Term, Term]:
     spots = points(graph, bent(times(place.cells, 1.0, 1.0), wave, 0.5), 'MANHATTAN')
     size = (row * 0.36 + 0.17) * (graph.parts(spots["Color"])[0] * 0.9 + 0.5)
     pit = graph.step(spots["Distance"], size, size * 0.55)
-    eye = knot(graph, place, _SCAR, wave)
+    eye = _knot(graph, place, _SCAR, wave)
     ring, hollow = lips(graph, eye)
     rough = furrows(graph, place, 7.0, 2.4)
     cork = graph.math('MAXIMUM', pit, graph.math('MAXIMUM', hollow, _brows(graph, eye) * 0.8))
@@ -549,7 +542,7 @@ def peeling(graph: Graph, place: Place) -> tuple[Term, Term]:
     spots = points(graph, bent(times(place.round, 1.3, 8.0), wave, 0.4))
     size = graph.parts(spots["Color"])[0] ** 2.0 * 0.36 + 0.1
     dashes = graph.step(noise * 0.4 + (spots["Distance"] - 0.2), size, size * 0.75)
-    eye = knot(graph, place, _SCAR, wave, apart=0.85)
+    eye = _knot(graph, place, _SCAR, wave, apart=0.85)
     # A scar is a black diamond, wider than high, and its brows hang from it.
     flat = graph.vector('DOT_PRODUCT', abs(eye.off), (0.45, 0.45, 1.5))
     scar = graph.step(flat + (eye.far > 50.0) + noise * 0.9, 1.35, 0.85)

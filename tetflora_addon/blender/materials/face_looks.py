@@ -395,12 +395,7 @@ FaceLooks = dict[str, NDArray[np.float16]]
 class FaceReader:
     """Reads looks of faces; images and means of materials are kept from one mesh to the next.
 
-    Images are forgotten when they take too much memory.
-
-    Parameters
-    ----------
-    most : int
-        See `_pyramid_of`.
+    Images are forgotten when they take too much memory; ``most`` is as of `_pyramid_of`.
     """
 
     def __init__(self, most: int = MOST_TEXELS) -> None:

@@ -64,13 +64,7 @@ def set_setting(group: PropertyGroup, name: str, value: Any) -> None:
 
 
 def check_population(where: str, entry: Any) -> None:
-    """Refuse what cannot be a population with a `ValueError`.
-
-    Parameters
-    ----------
-    where : str
-        What messages call it.
-    """
+    """Refuse what cannot be a population with a `ValueError`, which calls it as ``where`` says."""
     simple = {p.identifier for p in simple_settings(TetFloraLayer)}
     check_keys(where, entry, {"name"}, {"kind", "name", "grounds", "species", *simple})
     check_text(f'{where}: "name"', entry["name"])

@@ -417,7 +417,7 @@ def read_search(
     if above is None and is_cover(population):
         above = canopy_of(scene, depsgraph)
     suits = read_suits(population, ground.triangles, species, above)
-    present = standing(depsgraph, own, species)
+    present = _standing(depsgraph, own, species)
     zones = _read_zones(depsgraph, population, grounds)
     erased = (  # circles, as lines of one point
         Path(center[None], stroke[0])
@@ -427,16 +427,8 @@ def read_search(
     return Search(ground, rules, present, suits, tuple(erased), species, zones)
 
 
-def standing(depsgraph: Depsgraph, without: Collection[Object], species: Sequence[str]) -> tuple[Floats, Integers32]:
-    """Places (m, 3) and species (m,) of the plants of the scene, those that are objects and those of fields.
-
-    Parameters
-    ----------
-    without : set of bpy.types.Object
-        Plants and fields that do not count.
-    species : sequence of str
-        Identifiers that the result counts through; others have -1.
-    """
+def _standing(depsgraph: Depsgraph, without: Collection[Object], species: Sequence[str]) -> tuple[Floats, Integers32]:
+    """Places (m, 3) and species (m,) of plants of the scene, objects and fields; -1 for species that are not given."""
     numbers = {identifier: number for number, identifier in enumerate(species)}
     # What covers the ground keeps nobody away.
     objects = [o for o in not_of_covers(depsgraph.scene) if o not in without]

@@ -72,15 +72,11 @@ class Line:
     half_width: float  # width that its bevel adds to each side, meters
 
 
-def lines_of(obj: Object, depsgraph: Depsgraph) -> list[Line]:
+def _lines_of(obj: Object, depsgraph: Depsgraph) -> list[Line]:
     """Lines of a curve object, as smooth as it is drawn; none of objects of other types.
 
-    Modifiers count, except where a curve has a bevel, an extrusion or a fill: then its control points are read.
-
-    Raises
-    ------
-    SceneError
-        A NURBS curve with a bevel, an extrusion or a fill.
+    Modifiers count, except where a curve has a bevel, an extrusion or a fill: then its control points are read, but of
+    NURBS, which are an error.
     """
     evaluated, matrix, half_width = obj.evaluated_get(depsgraph), world_matrix(obj, depsgraph), 0.0
     if obj.type == 'CURVE':
@@ -209,7 +205,7 @@ def lines_within(paths: Collection, depsgraph: Depsgraph) -> tuple[Floats, ...]:
 
 def _lines(collection: Collection, depsgraph: Depsgraph, setting: str, closed: bool = False) -> list[Line]:
     """Curves of a collection, those that are closed or all of them; there is at least one."""
-    found = [line for obj in objects_within(collection) for line in lines_of(obj, depsgraph)]
+    found = [line for obj in objects_within(collection) for line in _lines_of(obj, depsgraph)]
     if not found:
         raise SceneError(f'The {setting} collection "{collection.name}" has no curves; add one, or clear {setting}')
     if not closed:

@@ -137,11 +137,6 @@ def leaf_objects(scene: bpy.types.Scene) -> dict[str, bpy.types.Object]:
 def resolved_species(scene: bpy.types.Scene, kind_of_plant: str, depsgraph: bpy.types.Depsgraph) -> Species:
     """A species with polygons and a skeleton in place of the names of objects.
 
-    Parameters
-    ----------
-    kind_of_plant : str
-        See `species.kinds`.
-
     Raises
     ------
     SpeciesError
