@@ -2,9 +2,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Write files for others: the plants of a scene for other programs, and a report of a fault."""
 
-import bpy
 from bpy.props import StringProperty
-from bpy.types import Operator
+from bpy.types import Context, Event, Operator
 from bpy_extras.io_utils import ExportHelper
 
 from ..tetflora_addon.blender.declare import once
@@ -48,12 +47,12 @@ class TETFLORA_OT_export_forest(
         """What is added to names without an ending."""
         return self.format
 
-    def steps(self, context: bpy.types.Context) -> Job[forest.Exported]:
+    def steps(self, context: Context) -> Job[forest.Exported]:
         path = self.path if self.path.suffix else self.path.with_suffix(self.format)
         order = forest.ExportOrder(path, self.variants, self.levels, self.polygons, self.bake)
         return forest.export_steps(context.scene, context.evaluated_depsgraph_get(), order)
 
-    def finish(self, context: bpy.types.Context, result: forest.Exported) -> set[str]:
+    def finish(self, context: Context, result: forest.Exported) -> set[str]:
         made = f"{counted(result.plants, 'plant')} as {counted(result.variants, 'variant')}"
         told = [f"{made} written to {result.path}, {result.megabytes:,.1f} MB", *result.problems]
         return self.done(". ".join(told), warns=result.problems)
@@ -68,11 +67,11 @@ class TETFLORA_OT_write_report(FileTool, Operator, ExportHelper, label="Write Re
     filename_ext = ".txt"
     filter_glob: StringProperty(default="*.txt", options={'HIDDEN'})
 
-    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+    def invoke(self, context: Context, event: Event) -> set[str]:
         self.filepath = self.filepath or "tetflora_report.txt"
         return super().invoke(context, event)
 
-    def run(self, context: bpy.types.Context) -> set[str]:
+    def run(self, context: Context) -> set[str]:
         path = self.path
         try:
             write_whole(path, report_text(context.scene))

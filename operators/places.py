@@ -7,7 +7,7 @@ from typing import Any
 
 import bpy
 from bpy.props import CollectionProperty, IntProperty, StringProperty
-from bpy.types import Operator
+from bpy.types import Context, Event, Operator, OperatorFileListElement, UILayout
 from bpy_extras.io_utils import ImportHelper
 
 from ..tetflora_addon.blender.declare import once
@@ -32,7 +32,7 @@ def _file(text: str) -> Path | None:
     return Path(bpy.path.abspath(text)) if text else None
 
 
-def column_row(layout: bpy.types.UILayout, title: str, values: str, translate: bool = False) -> bpy.types.UILayout:
+def column_row(layout: UILayout, title: str, values: str, translate: bool = False) -> UILayout:
     """Begin a row of the table of columns; what they are taken for, and the unit, come next."""
     row = layout.split(factor=0.25)
     row.label(text=title, translate=translate)
@@ -70,14 +70,14 @@ class _Importing(FileJob, ImportHelper):
     )
     crop_size: once.real("Side", "Side of the square", 2000.0, **within(1.0, 20_000.0, 500_000.0), unit='LENGTH')
 
-    def order(self, context: bpy.types.Context, **others: Any) -> Import:
+    def order(self, context: Context, **others: Any) -> Import:
         """What is to be imported."""
         epsg = projection.PLAIN if self.plain else self.epsg
         selected, graph = tuple(selected_grounds(context)), context.evaluated_depsgraph_get()
         crop = {"crop": self.crop, "side": self.crop_size}
         return Import(context.scene, graph, self.path, epsg, self.new_origin, selected, **crop, **others)
 
-    def finish(self, context: bpy.types.Context, result: Imported) -> set[str]:
+    def finish(self, context: Context, result: Imported) -> set[str]:
         if result.object is not None:
             select_only(context, [result.object])
         return self.done("; ".join(result.told), result.warning)
@@ -87,7 +87,7 @@ class _Raster(_Importing):
     """Mix-in for those that read rasters, or several tiles of one."""
 
     filter_glob: StringProperty(default=PATTERN, options={'HIDDEN'})
-    files: CollectionProperty(type=bpy.types.OperatorFileListElement, options={'HIDDEN', 'SKIP_SAVE'})
+    files: CollectionProperty(type=OperatorFileListElement, options={'HIDDEN', 'SKIP_SAVE'})
     directory: StringProperty(subtype='DIR_PATH', options={'HIDDEN', 'SKIP_SAVE'})
     scale: once.real(
         "Meters per Value",
@@ -98,7 +98,7 @@ class _Raster(_Importing):
     )
     offset: once.real("Height Offset", "Added to all values", **within(-20_000.0, high=20_000.0), unit='LENGTH')
 
-    def order(self, context: bpy.types.Context, **others: Any) -> Import:
+    def order(self, context: Context, **others: Any) -> Import:
         """What is to be imported, with the other chosen files as tiles."""
         folder = Path(bpy.path.abspath(self.directory)) if self.directory else self.path.parent
         tiles = (folder / file.name for file in self.files if file.name)
@@ -115,10 +115,7 @@ class TETFLORA_OT_import_terrain(_Raster, Operator, label="Import Terrain"):
     """Make ground from a raster of elevations, or from several tiles of one."""
 
     max_faces: once.integer(
-        "Max Faces",
-        "Face limit; finer rasters are averaged in blocks",
-        500_000,
-        **within(100, 4_000_000, 20_000_000),
+        "Max Faces", "Face limit; finer rasters are averaged in blocks", 500_000, **within(100, 4_000_000, 20_000_000)
     )
     image: once.string(
         "Orthophoto",
@@ -126,7 +123,7 @@ class TETFLORA_OT_import_terrain(_Raster, Operator, label="Import Terrain"):
         subtype='FILE_PATH',
     )
 
-    def steps(self, context: bpy.types.Context) -> Steps:
+    def steps(self, context: Context) -> Steps:
         return terrain_steps(self.order(context), self.max_faces, _file(self.image))
 
 
@@ -164,7 +161,7 @@ class TETFLORA_OT_import_inventory(_Importing, Operator, label="Import Tree Inve
     table: CollectionProperty(type=trees.TetFloraInventoryColumn, options={'HIDDEN', 'SKIP_SAVE'})
     active: IntProperty(options={'HIDDEN', 'SKIP_SAVE'})
 
-    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+    def invoke(self, context: Context, event: Event) -> set[str]:
         if not self.chosen or self.columns or self._is_forest:
             return super().invoke(context, event)
         try:
@@ -179,7 +176,7 @@ class TETFLORA_OT_import_inventory(_Importing, Operator, label="Import Tree Inve
         found = super().as_keywords(ignore=(*ignore, "table", "active"))
         return found | ({"columns": trees.chosen_columns(self.table)} if self.table else {})
 
-    def draw(self, _context: bpy.types.Context) -> None:
+    def draw(self, _context: Context) -> None:
         layout = self.layout
         if self.table:
             rows = min(max(len(self.table), 4), 16)
@@ -198,7 +195,7 @@ class TETFLORA_OT_import_inventory(_Importing, Operator, label="Import Tree Inve
     def _is_forest(self) -> bool:
         return self.path.suffix.lower() in USD_ENDINGS
 
-    def steps(self, context: bpy.types.Context) -> Steps:
+    def steps(self, context: Context) -> Steps:
         if self._is_forest:
             return forest_steps(self.order(context), parse_weights(mix_in(context.scene.tetflora.populate)))
         chosen = self.species if self.unknown == 'SPECIES' and self.species != NO_SPECIES else self.unknown
@@ -223,7 +220,7 @@ class TETFLORA_OT_import_canopy(_Raster, Operator, label="Import Canopy Height")
         subtype='FILE_PATH',
     )
 
-    def steps(self, context: bpy.types.Context) -> Steps:
+    def steps(self, context: Context) -> Steps:
         self.species = self.species or mix_in(context.scene.tetflora.populate)
         return trees.canopy_steps(self.order(context), parse_weights(self.species), self.min_height, _file(self.below))
 
@@ -244,5 +241,5 @@ class TETFLORA_OT_import_outlines(_Importing, Operator, label="Import Outlines")
         ),
     )
 
-    def steps(self, context: bpy.types.Context) -> Steps:
+    def steps(self, context: Context) -> Steps:
         return outline_steps(self.order(context), "" if self.kind == 'KEYS' else self.kind.title())

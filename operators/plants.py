@@ -2,8 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Change, re-roll, select and remove plants, and drop them to the ground."""
 
-import bpy
-from bpy.types import Operator
+from bpy.types import Context, Operator
 
 from ..tetflora_addon.blender.biomes.layers import active_layer, children_of, forget_gone
 from ..tetflora_addon.blender.declare import choice, once
@@ -26,7 +25,7 @@ class TETFLORA_OT_assign_species(Reporting, Operator, label="Change Species", ne
 
     species: choice("Species", "Species from the catalog", operator_items)
 
-    def run(self, context: bpy.types.Context) -> set[str]:
+    def run(self, context: Context) -> set[str]:
         if self.species in {"", NO_SPECIES}:
             return self.failed("Choose a species")
         changed = plant_objects.assign_species(selected_plants(context), self.species)
@@ -43,7 +42,7 @@ class TETFLORA_OT_reseed(Reporting, Operator, label="Re-roll Seeds", needs=(plan
 
     roll: once.integer("Roll", "A different number gives different plants", **within(0, 100))
 
-    def run(self, context: bpy.types.Context) -> set[str]:
+    def run(self, context: Context) -> set[str]:
         number = plant_objects.reseed(selected_plants(context), self.roll)
         fields = sorted((o for o in fields_of(context.selected_objects) if o.library is None), key=lambda o: o.name)
         for place, field in enumerate(fields):
@@ -59,7 +58,7 @@ class TETFLORA_OT_select_plants(Reporting, Operator, label="Select Plants", need
     layer: once.boolean("Of Layer", "Those of the active layer, or its fields")
     extend: once.boolean("Extend", "Extend the current selection")
 
-    def run(self, context: bpy.types.Context) -> set[str]:
+    def run(self, context: Context) -> set[str]:
         if self.layer:
             layer, found = active_layer(context.scene), []
             for one in () if layer is None else (layer, *children_of(layer)):
@@ -96,7 +95,7 @@ class TETFLORA_OT_remove_plants(Reporting, Operator, label="Remove Plants", told
     )
     species: once.string("Species", "Identifier of the species to remove")
 
-    def run(self, context: bpy.types.Context) -> set[str]:
+    def run(self, context: Context) -> set[str]:
         objects = context.selected_objects if self.which == 'SELECTED' else context.scene.objects
         every = plant_objects.plants_of(objects)
         plants = [o for o in every if self.which != 'SPECIES' or o.tetflora.species == self.species]
@@ -126,11 +125,11 @@ class TETFLORA_OT_drop_to_ground(
     Plants, results and refined meshes do not count as ground.
     """
 
-    def steps(self, context: bpy.types.Context) -> Job[DropResult]:
+    def steps(self, context: Context) -> Job[DropResult]:
         fields = [field for field in fields_of(context.selected_objects) if plant_objects.editable(field)]
         return drop_steps(context.scene, context.evaluated_depsgraph_get(), selected_plants(context), fields)
 
-    def finish(self, context: bpy.types.Context, result: DropResult) -> set[str]:
+    def finish(self, context: Context, result: DropResult) -> set[str]:
         left = [field.name for field in fields_of(context.selected_objects) if not plant_objects.editable(field)]
         notes = [f"{counted(result.missed, 'plant')} had no ground below or above"] if result.missed else []
         if left:

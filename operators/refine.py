@@ -2,8 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Refine the scene or only the levels of viewports, clear or keep results, convert plants, and clear the cache."""
 
-import bpy
-from bpy.types import Operator
+from bpy.types import Context, Event, Object, Operator, Scene
 
 from ..tetflora_addon.blender.declare import once
 from ..tetflora_addon.blender.job import refine
@@ -39,7 +38,7 @@ class TETFLORA_OT_refine(base.ModalJob, Operator, label="Refine", needs=(base.in
 
     keys = "Esc: Cancel   |   Return: Finish Early"
 
-    def steps(self, context: bpy.types.Context) -> Job[Statistics]:
+    def steps(self, context: Context) -> Job[Statistics]:
         scene, nothing = context.scene, not has_results(context.scene)
         made_for, expected = auto.results_made_for(scene), forecast(scene, context.view_layer)
         self.expected = seconds_here(expected) if expected else 0.0
@@ -57,7 +56,7 @@ class TETFLORA_OT_refine(base.ModalJob, Operator, label="Refine", needs=(base.in
                     refine.clear(scene, for_render=False)
                 raise
 
-    def finish(self, context: bpy.types.Context, statistics: Statistics) -> set[str]:
+    def finish(self, context: Context, statistics: Statistics) -> set[str]:
         prepare_scene(context.scene)
         if statistics.complete:
             auto.refined(context.scene)
@@ -82,7 +81,7 @@ class TETFLORA_OT_refine(base.ModalJob, Operator, label="Refine", needs=(base.in
         return {'FINISHED'}
 
 
-def _made(scene: bpy.types.Scene, statistics: Statistics) -> str:
+def _made(scene: Scene, statistics: Statistics) -> str:
     """What was refined, and what of it was made."""
     instances = base.counted(statistics.instances, "instance")
     if not (statistics.passes or statistics.plants) and statistics.instances_whole == statistics.instances > 0:
@@ -100,7 +99,7 @@ def _made(scene: bpy.types.Scene, statistics: Statistics) -> str:
     return f"{' and '.join(what)}: {made} in {sum(statistics.seconds.values()):.1f} s"
 
 
-def _unread_world(scene: bpy.types.Scene) -> str:
+def _unread_world(scene: Scene) -> str:
     """Parts of the world that baked lighting could not read, else an empty text."""
     if scene.tetflora.baked_light == 'OFF' or scene.tetflora.expand_everything:
         return ""
@@ -108,7 +107,7 @@ def _unread_world(scene: bpy.types.Scene) -> str:
     return f"Baked lighting: {note}" if note else ""
 
 
-def _unseen(scene: bpy.types.Scene, statistics: Statistics) -> str:
+def _unseen(scene: Scene, statistics: Statistics) -> str:
     """A warning if the camera sees no plant at all, so that nothing was divided after the first look; else empty."""
     near = statistics.polygons_meshed or statistics.instances_whole or statistics.instances_clusters
     if scene.camera is None or statistics.passes != 1 or near or scene.tetflora.max_passes:
@@ -134,7 +133,7 @@ class TETFLORA_OT_clear(base.Reporting, Operator, label="Clear", needs=(base.in_
     Plants remain, and hidden meshes are shown again.
     """
 
-    def run(self, context: bpy.types.Context) -> set[str]:
+    def run(self, context: Context) -> set[str]:
         auto.stop()
         stop_jobs("its results were cleared")
         hidden = hiding.hidden_originals(context.scene, 'VIEW')
@@ -156,7 +155,7 @@ class TETFLORA_OT_keep_results(
     Refine and Clear no longer change them. Turns off Refine at Render, to avoid rendering the plants twice.
     """
 
-    def run(self, context: bpy.types.Context) -> set[str]:
+    def run(self, context: Context) -> set[str]:
         scene = context.scene
         auto.stop()
         stop_jobs("the results were kept as meshes")
@@ -174,10 +173,10 @@ class TETFLORA_OT_make_plant_mesh(
     The plant remains, but disabled; Clear does not remove the mesh. Esc cancels without changes.
     """
 
-    def steps(self, context: bpy.types.Context) -> Job[list[bpy.types.Object]]:
+    def steps(self, context: Context) -> Job[list[Object]]:
         return make_plant_mesh_steps(context.scene, context.evaluated_depsgraph_get(), base.selected_plants(context))
 
-    def finish(self, context: bpy.types.Context, made: list[bpy.types.Object]) -> set[str]:
+    def finish(self, context: Context, made: list[Object]) -> set[str]:
         context.view_layer.update()
         base.select_only(context, made)
         polygons = sum(len(obj.data.polygons) for obj in made)
@@ -201,10 +200,10 @@ class TETFLORA_OT_preview_levels(base.ModalJob, Operator, label="Compute Levels"
     cancelled = "Cancelled; the levels are unchanged"
     clear: once.boolean("Clear Levels", "Remove the levels from viewports and memory instead. The file does not change")
 
-    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+    def invoke(self, context: Context, event: Event) -> set[str]:
         return self.execute(context) if self.clear else super().invoke(context, event)
 
-    def run(self, context: bpy.types.Context) -> set[str]:
+    def run(self, context: Context) -> set[str]:
         if not self.clear:
             return super().run(context)
         if getattr(state.find(context.scene), "levels", None) is None:
@@ -212,10 +211,10 @@ class TETFLORA_OT_preview_levels(base.ModalJob, Operator, label="Compute Levels"
         state.forget(context.scene)
         return {'FINISHED'}
 
-    def steps(self, context: bpy.types.Context) -> Job[Levels]:
+    def steps(self, context: Context) -> Job[Levels]:
         return level_steps(context.scene, context.evaluated_depsgraph_get())
 
-    def finish(self, context: bpy.types.Context, levels: Levels) -> set[str]:
+    def finish(self, context: Context, levels: Levels) -> set[str]:
         last = levels.levels[-1]
         context.scene.tetflora.preview.level = last.number
         return self.done(

@@ -28,6 +28,8 @@ from tetflora_addon.proxies.microsurfaces import Facets
 from tetflora_addon.proxies.primitives import joined, shape_buffers, triangles_of
 from tetflora_addon.refinement.contents import bounding_capsules
 from tetflora_addon.refinement.loop import Refinement
+from tetflora_addon.refinement.polygons import Polygons
+from tetflora_addon.refinement.shared_parts import AssetParts
 from tetflora_addon.species.catalog import builtin_folder, load_species, species_from_dict
 from tetflora_addon.species.members import expected_polygons
 from tetflora_addon.species.quality import with_quality
@@ -312,6 +314,11 @@ def bounding_cylinders(flora: Flora, subplants: Branches) -> tuple[NDArray, NDAr
     """Centers (n, 3), radii and half heights (n,) of cylinders about branches that hold all of sub-plants."""
     capsules = bounding_capsules(flora, subplants)
     return capsules[:3].T, capsules[6] + capsules[8], capsules[7] + capsules[8]
+
+
+def box_around(things: AssetParts | Polygons) -> NDArray[np.float64]:
+    """Axis-aligned box (2, 3) around the spheres of one or more things, meters."""
+    return np.stack([(things.center.T - things.reach).min(axis=1), (things.center.T + things.reach).max(axis=1)])
 
 
 def face_planes(vertices: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -157,8 +157,7 @@ def test_versions_are_compared_in_one_place() -> None:
 
 
 @pytest.mark.parametrize(
-    "text",
-    ["see /w" + "ork/main", "from .." + "/shared/data", "https://p" + "ypi.org/simple", "/h" + "ome/ada/x"],
+    "text", ["see /w" + "ork/main", "from .." + "/shared/data", "https://p" + "ypi.org/simple", "/h" + "ome/ada/x"]
 )
 def test_house_rules_can_fail(text: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     bad = tmp_path / "bad.py"

@@ -58,8 +58,7 @@ def test_structures_of_other_systems_have_their_sizes():
 
 
 @pytest.mark.parametrize(
-    ("system", "asked"),
-    [("linux", {"malloc_trim"}), ("darwin", {"malloc_zone_pressure_relief"}), ("win32", set())],
+    ("system", "asked"), [("linux", {"malloc_trim"}), ("darwin", {"malloc_zone_pressure_relief"}), ("win32", set())]
 )
 def test_each_system_is_asked_in_its_own_words_to_take_memory_back(monkeypatch, system, asked):
     called = set()

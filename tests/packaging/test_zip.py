@@ -89,18 +89,7 @@ def test_nothing_needs_a_permission_that_the_manifest_lacks() -> None:
     Only `processes.pool` starts any: the Python that runs it, with the engine's own code.
     """
     own = rooms.ROOT / "tetflora_addon" / "processes" / "pool.py"
-    banned = {
-        "socket",
-        "ssl",
-        "http",
-        "urllib",
-        "ftplib",
-        "smtplib",
-        "asyncio",
-        "requests",
-        "subprocess",
-        "aud",
-    }
+    banned = {"socket", "ssl", "http", "urllib", "ftplib", "smtplib", "asyncio", "requests", "subprocess", "aud"}
     words = {"clipboard", "popen", "online_access", "url_open", "path_open"}
     for path in rooms.sources().values():
         for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):

@@ -190,10 +190,4 @@ def own_ground(hand, _scene, found):
     yield from hand.render(found)
 
 
-TASKS = {
-    "own_ground": own_ground,
-    "biome": biome,
-    "autumn": autumn,
-    "own_tree": own_tree,
-    "first_forest": first_forest,
-}
+TASKS = {"own_ground": own_ground, "biome": biome, "autumn": autumn, "own_tree": own_tree, "first_forest": first_forest}

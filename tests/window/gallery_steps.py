@@ -14,9 +14,7 @@ from devtools.aliases import INSTALLED, alias
 alias(INSTALLED)
 from panels.species import TETFLORA_PT_species  # noqa: E402  (found only now)
 
-GALLERIES = {
-    "species": (TETFLORA_PT_species, "species_choice", lambda group: (group.species_editor, "species")),
-}
+GALLERIES = {"species": (TETFLORA_PT_species, "species_choice", lambda group: (group.species_editor, "species"))}
 
 
 def steps(ui):

@@ -183,11 +183,8 @@ def frames_of(linear: Floats) -> tuple[Floats, Floats, Mask]:
         rest = np.linalg.norm(x, axis=1, keepdims=True)
         x = x / rest
         frame = np.stack([x, np.cross(z, x), z], axis=2)
-        sound = (
-            ((lengths > _TINY) & (lengths < _HUGE)).all(axis=1)
-            & (rest[:, 0] > _TINY)
-            & np.isfinite(frame).all(axis=(1, 2))
-        )
+        sized = ((lengths > _TINY) & (lengths < _HUGE)).all(axis=1)
+        sound = sized & (rest[:, 0] > _TINY) & np.isfinite(frame).all(axis=(1, 2))
     return frame, lengths.mean(axis=1), sound
 
 

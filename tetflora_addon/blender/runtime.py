@@ -296,8 +296,6 @@ class JobData:
 
     Parameters
     ----------
-    job : str
-        Its name for the artist.
     depsgraph : bpy.types.Depsgraph
         It goes with its view layer, and using it then would crash Blender.
     """

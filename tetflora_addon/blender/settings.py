@@ -43,8 +43,6 @@ def properties_of(settings: type, **common: Any) -> SimpleNamespace:
 
     Parameters
     ----------
-    settings : type
-        The dataclass.
     **common
         Further options of all of them, as ``options`` and ``update``.
 
@@ -140,8 +138,6 @@ def switches(name: str, description: str, made: dict[str, Any]) -> type:
     ----------
     name : str
         Identifier of that; in title case its label.
-    made : dict
-        The properties by their names.
     """
     said = [one.keywords for one in made.values()]
 

@@ -19,14 +19,8 @@ CONTEXTS = ("Operator", "*")
 Entries = dict[tuple[str, str], str]
 
 
-def read_language(path: Path) -> Entries:
-    """Translations in a file by context and English text, as Blender takes them.
-
-    Raises
-    ------
-    TetFloraError
-        It cannot be read, or is not of the form above; the message names the file and the place.
-    """
+def _read_language(path: Path) -> Entries:
+    """Translations in a file by context and English text, as Blender takes them; errors name the file and the place."""
     try:
         groups = json.loads(path.read_text(encoding="utf-8"))
     except (OSError, ValueError) as error:
@@ -49,7 +43,7 @@ def read_languages(folder: Path = FOLDER) -> dict[str, Entries]:
     found = {}
     for path in sorted(folder.glob("*.json")):
         try:
-            found[path.stem] = read_language(path)
+            found[path.stem] = _read_language(path)
         except TetFloraError as error:
             print(f"TetFlora: error: {error}", file=sys.stderr, flush=True)
     return found

@@ -20,12 +20,12 @@ from ..arrays import Floats, Integers, Mask, chunks, column
 from ..assets.costs import FARTHER, OriginalPolicy
 from ..camera.camera import Camera
 from ..growth.hashing import Draw, uniform
-from ..proxies.microsurfaces import Facets, facet_totals, facets_of_assets
+from ..proxies.microsurfaces import facet_totals, facets_of_assets
 from ..proxies.primitives import triangle_corners
 from ..refinement.decisions import explicit_fraction
 from ..refinement.loop import Refinement
 from ..refinement.shared_parts import AssetParts, PlacedAssets
-from .frontier import Canvas, FrontierKind, Shown, Waiting, Whose, opaque_fractions
+from .frontier import Canvas, FrontierKind, Owned, Shown, Waiting, opaque_fractions
 from .plants import KITES, inside_explicit
 
 #: Stands for a species where facets are of assets.
@@ -166,16 +166,12 @@ class PlacedClusters(FrontierKind):
         made = facets_of_assets(self.placed, some, totals, np.maximum(least, np.sqrt(self.one_leaf(some))), least)
         canvas.add_shown(triangle_corners(made), float(faces))
 
-    def unseen(
-        self, rows: ClusterRows, side: Floats, kept: Floats, _shown: list[Shown]
-    ) -> Iterator[tuple[Whose, Facets]]:
+    def unseen(self, rows: ClusterRows, side: Floats, kept: Floats, _shown: list[Shown]) -> Iterator[Owned]:
         """As of `FrontierKind`."""
         some = np.flatnonzero(~rows.shown)
         yield from self._facets(rows.take(some), side[some], 1.0 - kept[some])
 
-    def _facets(
-        self, rows: ClusterRows, side: Floats, left_out: Floats | None = None
-    ) -> Iterator[tuple[Whose, Facets]]:
+    def _facets(self, rows: ClusterRows, side: Floats, left_out: Floats | None = None) -> Iterator[Owned]:
         looks = self.looks[rows.instance]
         leaf = np.maximum(side, np.sqrt(self.one_leaf(rows)))
         for look in np.unique(looks).tolist():

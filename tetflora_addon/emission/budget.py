@@ -49,8 +49,7 @@ BYTES_PER_TRIANGLE = 380
 A_PIXEL = 12.0
 #: Steps in which memory counts: a half of one is lost on average.
 MEMORY_STEP = 1.05
-#: Polygons and facets that are never too many with the facets of *Final*, see `relative_side`; and how many times finer
-#: facets are at most.
+#: Polygons and facets that are never too many with the facets of *Final*; how many times finer facets are at most.
 PLENTY, FINEST = 2_400_000.0, 5.0
 #: What an expected number may be off by.
 RESERVE = 0.15
@@ -93,8 +92,6 @@ def fit_to_budget(
 
     Parameters
     ----------
-    result : Refinement
-        Of the loop.
     faces : float, optional
         Faces of each proxy tetrahedron; by default proxies are facets or spheres, whose number follows their size.
     times : float
@@ -112,7 +109,7 @@ def fit_to_budget(
     polygons = float(len(result.cell_polygons.polygons))
     covered = times * float(contributions(result.cells, result.transmittance)[result.in_view[result.nodes]].sum())
     number = primitives(covered, camera, settings.facet)
-    asked = relative_side(number, settings.facet)
+    asked = _relative_side(number, settings.facet)
     left = max(most - polygons, 0.01 * most) if np.isfinite(most) else most
     coarser = max(asked, (number / left) ** (1.0 / FEWER))
     pixels = max(1.0 / (coarser * settings.facet), 1.0)
@@ -128,18 +125,9 @@ def fit_to_budget(
     )
 
 
-def relative_side(number: float, facet: float) -> float:
-    """Side of facets over that which is asked for, where there would be so many primitives: 1, or less if few.
-
-    What is asked to be coarser than *Final* is so in small images as well: they would take as long otherwise.
-
-    Parameters
-    ----------
-    number : float
-        Polygons and facets with the side that is asked for.
-    facet : float
-        That side, pixels.
-    """
+def _relative_side(number: float, facet: float) -> float:
+    """Side of facets over one of so many pixels that is asked for, with which there would be so many: 1, or less."""
+    # What is asked to be coarser than *Final* is so in small images as well: they would take as long otherwise.
     few = PLENTY / max(facet / RefinementSettings().facet, 1.0) ** 2
     return float(np.clip(np.sqrt(number / few), 1.0 / FINEST, 1.0))
 
@@ -179,8 +167,7 @@ SECONDS_OPENED = np.array([0.6, 2.18e-5])
 SECONDS_EXPANDED = np.array([5e-7, 1.2e-7])
 #: Bytes of each plant, of each process that draws, and of each polygon or facet of the tile that it draws.
 BYTES_PER_PLANT, BYTES_PER_PROCESS, BYTES_IN_TILE = 500.0, 130e6, 350.0
-#: Leaves and branches that are looked at, about, how many of them lie in a cell of the image, and how many of a plant
-#: in view for one of a plant that is not.
+#: Leaves and branches that are looked at, about; those in a cell of the image, and in view for one beside it.
 _PARTS, _IN_CELL, _IN_VIEW = 4096, 32, 16.0
 #: Layers of leaves in a covered pixel of which something is drawn, with facets of a pixel, about; the larger these are,
 #: the more of them reach beyond what hides them, by the fifth root of their side.
@@ -315,10 +302,7 @@ def estimate(
 def _numbers(
     stand: Stand, camera: Camera, settings: RefinementSettings, parts: CrownParts, plant: Integers, whole: Floats
 ) -> tuple[float, Floats]:
-    """Polygons and facets without limits, and what is opened (2,), see `SECONDS_OPENED`.
-
-    ``whole`` (n,) is `_polygons` of parts.
-    """
+    """Polygons and facets without limits, by `_polygons` (n,), and what is opened (2,), see `SECONDS_OPENED`."""
     pixels, extent = camera.width * camera.height, camera.extent_around(parts.position)
     inside = _inside(parts, camera, extent)
     outside = ~inside & (parts.form >= 0)
@@ -331,7 +315,7 @@ def _numbers(
     extent, whole = extent[inside], whole[inside]
     area, wide, wood = parts.area / extent**2, parts.width / extent, parts.form < 0
     before, here, covered = _in_depth(parts, camera, parts.number * area)
-    coarser = relative_side(primitives(_OVERLAP * covered, camera, settings.facet), settings.facet)
+    coarser = _relative_side(primitives(_OVERLAP * covered, camera, settings.facet), settings.facet)
     facet = (coarser * settings.facet) ** 2
     most = _LAYERS * facet**0.1 + deep[inside]
     drawn = np.exp(-before / most) * -np.expm1(-here / most) * most / here
@@ -417,10 +401,7 @@ def _through(stand: Stand, parts: CrownParts, plant: Integers, extent: Floats) -
 
 
 def _in_depth(parts: CrownParts, camera: Camera, pixels: Floats) -> tuple[Floats, Floats, float]:
-    """Layers (n,) before each of parts (n,) that have so many pixels (n,) in all, its own (n,), and covered pixels.
-
-    In each cell of the image parts lie one behind the other.
-    """
+    """Layers (n,) before each of parts (n,) that have so many pixels (n,) in all, its own (n,), and covered pixels."""
     if not len(parts):
         return np.zeros(0), np.zeros(0), 0.0
     image = Coverage(camera, (0, 1))

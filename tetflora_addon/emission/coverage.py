@@ -186,12 +186,8 @@ class Coverage:
 
     def outside(self, prints: Footprints) -> Mask:
         """Things (n,) of which nothing is in the image."""
-        return (
-            (prints.high[:, 0] < 0)
-            | (prints.high[:, 1] < 0)
-            | (prints.low[:, 0] > self.width)
-            | (prints.low[:, 1] > self.height)
-        )
+        (left, bottom), (right, top) = prints.low.T, prints.high.T
+        return (right < 0) | (top < 0) | (left > self.width) | (bottom > self.height)
 
     def hidden(self, prints: Footprints) -> Mask:
         """Things (n,) behind full pixels wherever they are in the image; those outside are."""

@@ -347,10 +347,7 @@ class _Tile(Canvas):
         return (self.asked + _EXPECTED * expected) / (layers + _EXPECTED * _LAYERS) * max(_LAYERS - layers, 1.0)
 
     def _leave_out(self, number: float) -> None:
-        """Leave out so many things, should there be more than allowed.
-
-        First go facets that nobody sees, then the smallest faces in the image, then seen facets; facets by a hash.
-        """
+        """Leave out so many: facets that nobody sees by a hash, the smallest faces, then seen facets by a hash."""
         if number <= 0.0:
             return
 
@@ -414,10 +411,7 @@ class _Tile(Canvas):
     # -- what is not seen -----------------------------------------------------------------------------------------
 
     def _merge(self, facets: Facets, number: Floats, whose: Whose) -> None:
-        """Few large facets for many that are hidden, by a random number (n,) of each.
-
-        Each lies behind full pixels as a whole. Large ones stand for others of their kind in their cell of the image.
-        """
+        """Few large facets behind full pixels, for many hidden ones of their kind and cell, by random numbers (n,)."""
         prints, column, row, _ = self.coverage.of_corners(triangle_corners(facets))
         # A facet has another outline than the face for which it stands.
         left = np.flatnonzero(self.coverage.hidden(prints))

@@ -109,8 +109,7 @@ class ProxyEmitter:
 
     #: Makes the buffers of a `EmissionInput`, for proxies that the renderer lights.
     blocks: Callable[[EmissionInput], Iterator[Buffers]]
-    #: Given the camera, `EmissionInput.disc` and where the sun is, what becomes of facets where they are made; None in
-    #: forms without facets.
+    #: Given camera, `EmissionInput.disc` and the way to the sun: what becomes of facets as they are made; None without.
     form: Callable[[Camera, float, Floats | None], FacetConverter] | None = None
     #: The same with baked light, given that light and the number of the first facet in its list of sheets. None:
     #: proxies of this form are always lit by the renderer.
@@ -156,25 +155,21 @@ def facet_blocks(refined: EmissionInput) -> Iterator[Buffers]:
                 yield replace(shape_buffers(joined(own)), species=parts.species, look=parts.look)
 
 
-def shell_blocks(
-    refined: EmissionInput, light: BakedLight | None = None, _first_sheet: int = 0
-) -> Iterator[MeshBuffers]:
+def shell_blocks(refined: EmissionInput, light: BakedLight | None = None, _first: int = 0) -> Iterator[MeshBuffers]:
     """Proxies as shells, in one block."""
     shells = proxy_shells(refined.flora, refined.refinement, light)
     if shells is not None:
         yield shells
 
 
-def baked_facet_blocks(
-    refined: EmissionInput, light: BakedLight, first_sheet: int, round_: bool = False
-) -> Iterator[Buffers]:
+def baked_facet_blocks(given: EmissionInput, light: BakedLight, first: int, round_: bool = False) -> Iterator[Buffers]:
     """Facets, or a sphere for each, with baked light, in which the first of them is that sheet."""
-    sun = sun_of(refined.refinement.lights)
-    form = FacetForm(refined.camera, refined.disc, sun, (True, False) if round_ else ())
-    for parts in refined.facet_parts():
+    sun = sun_of(given.refinement.lights)
+    form = FacetForm(given.camera, given.disc, sun, (True, False) if round_ else ())
+    for parts in given.facet_parts():
         facets = joined([some for some, _ in parts])
-        sheets = np.arange(first_sheet, first_sheet + len(facets))
-        first_sheet += len(facets)
+        sheets = np.arange(first, first + len(facets))
+        first += len(facets)
         made = shape_buffers(joined([form(some, seen) for some, seen in parts]))
         if round_:
             baked = baked_attributes('POINT', light.of_spheres(facets, sheets))
@@ -190,6 +185,5 @@ MICROSPHERES = ProxyEmitter(
 )
 #: Facets where they are seen, spheres elsewhere. Where light is baked, all are facets.
 AUTOMATIC = ProxyEmitter(facet_blocks, partial(FacetForm, spheres=(False,)), baked_facet_blocks)
-#: Shells fill their tetrahedra evenly, so that hidden ones are divided as well; those that are seen further, because
-#: their shape shows.
+#: Shells fill their tetrahedra evenly: hidden ones are divided as well; seen ones further, because their shape shows.
 SHELLS = ProxyEmitter(shell_blocks, None, shell_blocks, faces=4.0, hidden_block=16.0, proxy_block=4.0)

@@ -42,6 +42,8 @@ _THIN = 233  # draw of this module
 
 #: Whose facets some are: a species, assets, or None for your own meshes; and the look of those that are no plants.
 Whose = tuple[int | None, str]
+#: Facets, and whose they are.
+Owned = tuple[Whose, Facets]
 #: Things that are drawn as they are, and how.
 Shown = tuple[str, Arrays]
 
@@ -182,7 +184,7 @@ class FrontierKind:
         """Draw parts that are seen, with facets of sides (n,), meters."""
         raise NotImplementedError
 
-    def unseen(self, parts: Arrays, side: Floats, kept: Floats, shown: list[Shown]) -> Iterator[tuple[Whose, Facets]]:
+    def unseen(self, parts: Arrays, side: Floats, kept: Floats, shown: list[Shown]) -> Iterator[Owned]:
         """Facets of sides (n,), meters, of a fraction (n,) of parts that nobody sees."""
         raise NotImplementedError
 
@@ -288,9 +290,8 @@ class Frontier:
 
         Also their order (n,) by cell and depth, and how many cells there are.
         """
-        every, nearest, count, radius = (
-            np.concatenate([pool.column(name) for pool in pools]) for name in ("cell", "near", "count", "radius")
-        )
+        names = ("cell", "near", "count", "radius")
+        every, nearest, count, radius = (np.concatenate([pool.column(name) for pool in pools]) for name in names)
         self._filling = -np.expm1(-np.append(np.bincount(every, count * self.facet**2), 0.0) / CELL**2)
         deepest = float(np.ptp(nearest)) + 1.0
         order = np.argsort(every * deepest + (nearest - nearest.min()), kind="stable")

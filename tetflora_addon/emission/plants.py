@@ -35,7 +35,7 @@ from ..leaves.models import LeafModel
 from ..processes.pool import WORTH_PROCESSES, in_processes
 from ..proxies.facet_weights import FacetWeights, leaf_shares
 from ..proxies.hotspots import light_ratios
-from ..proxies.microsurfaces import FacetRules, Facets, piece_facets, subplant_facets
+from ..proxies.microsurfaces import FacetRules, piece_facets, subplant_facets
 from ..refinement.contents import PlantParts, as_pieces, piece_totals
 from ..refinement.decisions import Decision, explicit_fraction
 from ..refinement.lights import Light
@@ -47,7 +47,7 @@ from ..subplants.pieces import Thin, expand, whole_pieces
 from ..subplants.rings import Pixels
 from ..subplants.tubes import tube_buffers, twig_buffers
 from .coverage import Coverage, Footprints
-from .frontier import Canvas, FrontierKind, Shown, Waiting, Whose, opaque_fractions
+from .frontier import Canvas, FrontierKind, Owned, Shown, Waiting, opaque_fractions
 
 #: Pixels by which the margin of a leaf may be off.
 TOLERANCE = 0.5
@@ -221,7 +221,7 @@ def explicit_blocks(flora: Flora, result: Refinement, camera: Camera, tolerance:
         some = some.take(np.lexsort([some.key, np.linalg.norm(some.position - camera.eye, axis=1)]))
         polygons = piece_totals(flora, as_pieces(some)).polygons if alone else flora.face_counts(some)
         runs += [(alone, some.take(run)) for run in chunks(polygons, BLOCK_POLYGONS)]
-    yield from _made_in_processes(flora, LeafDetail(flora, camera, tolerance), runs, len(runs) > 1)
+    yield from _made(flora, LeafDetail(flora, camera, tolerance), runs, len(runs) > 1)
 
 
 def expanded_blocks(flora: Flora, seeds: Seeds, camera: Camera | None = None) -> Iterator[Block]:
@@ -230,12 +230,10 @@ def expanded_blocks(flora: Flora, seeds: Seeds, camera: Camera | None = None) ->
     full = flora.polygons[plants.row] if plants.crown is None else flora.face_counts(plants)
     runs = [(False, plants.take(run)) for run in chunks(full, BLOCK_POLYGONS)]
     worth = len(runs) > 1 and float(full.sum()) > WORTH_PROCESSES
-    yield from _made_in_processes(flora, None if camera is None else LeafDetail(flora, camera), runs, worth)
+    yield from _made(flora, None if camera is None else LeafDetail(flora, camera), runs, worth)
 
 
-def _made_in_processes(
-    flora: Flora, detail: LeafDetail | None, runs: list[tuple[bool, Branches]], worth: bool
-) -> Iterator[Block]:
+def _made(flora: Flora, detail: LeafDetail | None, runs: list[tuple[bool, Branches]], worth: bool) -> Iterator[Block]:
     """The meshes of runs of branches, which are alone or with all that grows on them."""
     number = len(runs)
     items = ((n, (n + 1) / number, *runs.pop(0)) for n in range(number))
@@ -370,9 +368,7 @@ class GrownPlants(FrontierKind):
                 canvas.add_facets((s, ""), subplant_facets(self.flora, own, rules))
         self._draw_branches(canvas, branches.take(np.flatnonzero(lines)), side[lines])
 
-    def unseen(
-        self, parts: PlantParts, side: Floats, kept: Floats, _shown: list[Shown]
-    ) -> Iterator[tuple[Whose, Facets]]:
+    def unseen(self, parts: PlantParts, side: Floats, kept: Floats, _shown: list[Shown]) -> Iterator[Owned]:
         """As of `FrontierKind`."""
         for s, every in self._by_species(parts.branches):
             for alone in (False, True):

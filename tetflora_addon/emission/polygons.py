@@ -28,7 +28,7 @@ from ..refinement.contents import polygon_totals
 from ..refinement.decisions import Decision
 from ..refinement.loop import Refinement
 from ..refinement.polygons import Meshes, Polygons, mended
-from .frontier import Canvas, FrontierKind, Shown, Waiting, Whose
+from .frontier import Canvas, FrontierKind, Owned, Shown, Waiting
 
 #: Least fraction of a surface that is opaque where it hides what is behind.
 OPAQUE = 0.99
@@ -96,14 +96,14 @@ class Faces(FrontierKind):
         for whose, facets in self._facets(rows.take(rest), side[rest]):
             canvas.add_facets(whose, facets)
 
-    def unseen(self, rows: FaceRows, side: Floats, _kept: Floats, shown: list[Shown]) -> Iterator[tuple[Whose, Facets]]:
+    def unseen(self, rows: FaceRows, side: Floats, _kept: Floats, shown: list[Shown]) -> Iterator[Owned]:
         """As of `FrontierKind`; large faces stay."""
         large = _stays(rows, side)
         shown.append(("face", rows.take(np.flatnonzero(large))))
         rest = np.flatnonzero(~large)
         yield from self._facets(rows.take(rest), side[rest])
 
-    def _facets(self, rows: FaceRows, side: Floats) -> Iterator[tuple[Whose, Facets]]:
+    def _facets(self, rows: FaceRows, side: Floats) -> Iterator[Owned]:
         looks = np.array(self.looks)[self.meshes.surface[rows.instance]]
         polygons = rows.whole(self.meshes)
         for look in np.unique(looks).tolist():

@@ -30,26 +30,13 @@ _BARYCENTRIC = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], dtype=np.f
 _FLAT = 1e-13
 
 
-def shell_buffers(cells: MediumCells, rank: NDArray | None = None, light: Floats | None = None) -> MeshBuffers:
+def _shell_buffers(cells: MediumCells, rank: NDArray | None = None, light: Floats | None = None) -> MeshBuffers:
     """One mesh of all proxy tetrahedra, with the attributes of the shell material (paper, section 7).
 
     Names and units of the attributes are in ``docs/architecture.md``. Each cell has vertices of its own: barycentric
-    coordinates differ from cell to cell at a shared corner.
-
-    Parameters
-    ----------
-    cells : MediumCells of n
-    rank : (n,) number, optional
-        Place of each cell front to back as the camera sees them, in any unit. Cells are then written back to front:
-        EEVEE blends the faces of a mesh in their order. Without it cells keep theirs.
-    light : (n, 4, 3) float, optional
-        Radiance that the contents scatter toward the camera at each corner, albedo and phase included, W/(m² sr);
-        becomes ``tf_light0`` to ``tf_light3`` for the material of baked light.
-
-    Returns
-    -------
-    MeshBuffers
-        Four triangles, four vertices and six edges a cell, facing outwards. Flat cells get no extinction.
+    coordinates differ from cell to cell at a shared corner. Flat cells get no extinction. By a rank (n,) front to back
+    they are written back to front: EEVEE blends the faces of a mesh in their order. Light (n, 4, 3) is the radiance
+    that contents scatter toward the camera at corners, albedo and phase included, W/(m² sr), for baked light.
     """
     order = np.arange(len(cells)) if rank is None else np.argsort(rank, kind='stable')[::-1]
     cells = cells.take(order)
@@ -94,7 +81,7 @@ def proxy_shells(flora: Flora, result: Refinement, light: BakedLight | None = No
         return None
     cells = set_apart(MediumCells.of(flora, result, result.nodes[proxies]))
     radiance = None if light is None else light.illumination.cell_sources(light.camera)[proxies]
-    return shell_buffers(cells, result.rank[proxies], radiance)
+    return _shell_buffers(cells, result.rank[proxies], radiance)
 
 
 def set_apart(cells: MediumCells) -> MediumCells:

@@ -52,8 +52,7 @@ class BakedSurface:
     transmission: float = 0.0
     roughness: float = 0.6
     gloss: float = 0.0  # fraction of light that is mirrored, mean of directions
-    #: Name of a texture, ``color``, ``normal``, ``roughness`` or, with alpha, ``opacity`` and ``card``, color
-    #: and alpha in one, to its file.
+    #: Files by names of textures: ``color``, ``normal``, ``roughness``, ``opacity``, and ``card``, color with alpha.
     textures: Mapping[str, str] = field(default_factory=dict)
     cut: float = 0.0  # alpha of its color texture below which nothing is shown; 0 without alpha
     kept: float = 1.0  # part of leaves that alpha leaves

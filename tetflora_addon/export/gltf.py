@@ -125,10 +125,8 @@ def _add_material(document: _Document, folder: Path, surface: BakedSurface) -> i
         metallic |= {"roughnessFactor": 1.0, "metallicRoughnessTexture": textures["roughness"]}
     # Twigs of coarse levels are sheets, as leaves are.
     made = {"name": surface.name, "pbrMetallicRoughness": metallic, "doubleSided": True}
-    made |= {
-        "extensions": {"KHR_materials_ior": {"ior": surface.index}},
-        "extras": {"transmission": surface.transmission},
-    }
+    index = {"KHR_materials_ior": {"ior": surface.index}}
+    made |= {"extensions": index, "extras": {"transmission": surface.transmission}}
     made |= {"normalTexture": textures["normal"]} if "normal" in textures else {}
     made |= {"alphaMode": "MASK", "alphaCutoff": surface.cut} if surface.cut else {}
     return document.add("materials", made)

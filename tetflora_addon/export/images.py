@@ -142,9 +142,7 @@ def halved(texels: Floats32) -> Floats32:
 
 
 def png(texels: Floats32, linear: bool = False) -> bytes:
-    """A PNG file of texels (h, w, n) from 0 to 1, row 0 lowest; colors are linear RGB and stored as sRGB unless the
-    numbers mean something else.
-    """
+    """A PNG file of texels (h, w, n) from 0 to 1, row 0 lowest; stored as sRGB, unless numbers mean no colors."""
     height, width, channels = texels.shape
     values = np.clip(texels[::-1], 0.0, 1.0).astype(np.float64)
     if not linear:

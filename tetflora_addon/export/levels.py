@@ -20,7 +20,7 @@ from ..buffers import MeshBuffers, concatenate_buffers
 from ..compiled.flora import Flora
 from ..growth.growth import WholeBranches, leaf_counts, trunks
 from ..growth.hashing import uniform
-from ..growth.seeds import Branches, Seeds
+from ..growth.seeds import Seeds
 from ..species.species import LEAF_KINDS
 from ..subplants.leaf_meshes import leaf_meshes
 from ..subplants.pieces import expand
@@ -128,7 +128,7 @@ def _corrected(
     pixel: float,
     grids: list[Grid],
     truth: list[PlantView],
-    size: float = 0.0,
+    size: float,
 ) -> PlantLevel:
     """A level whose leaves are so much larger that it covers as much as the full plant on average over views, and whose
     colors are so much brighter that what is seen of it has the same mean. It begins with a size, the logarithm of area.
@@ -194,16 +194,12 @@ def _parts(flora: Flora, grown: list[WholeBranches], back: Floats, pixel: float 
 
 
 def _leaf_parts(flora: Flora, grown: list[WholeBranches], pixel: float) -> Iterator[tuple[str, MeshBuffers]]:
-    def fractions(branches: Branches) -> tuple[Floats, Floats, Floats]:
-        one = np.ones(len(branches))
-        return one, one, one
-
     def thin(key: Keys, _center: Floats, radius: Floats) -> tuple[Integers, Floats]:
         part = np.clip((2.0 * radius / (_LONG * pixel)) ** 2, 0.0, 1.0)
         kept = np.flatnonzero(uniform(key, _KEPT) < part)
         return kept, 1.0 / part[kept]
 
-    given = (fractions, None, thin) if pixel else ()
+    given = (lambda branches: (np.ones(len(branches)),) * 3, None, thin) if pixel else ()
     for mesh in leaf_meshes(flora, 0, grown, *given):
         yield LEAF_KINDS[mesh.kind], mesh.buffers
 
@@ -223,11 +219,8 @@ def _wood_parts(flora: Flora, grown: list[WholeBranches], pixel: float) -> Itera
             likely = np.clip(np.pi * branches.radius * branches.length / (_LONG * pixel) ** 2, 1e-4, 1.0)
             some = np.flatnonzero((wide < _WIDE) & (uniform(branches.key, _TWIG) < likely))
             if len(some):
-                made.append(
-                    twig_buffers(
-                        flora, whole.take(some), np.minimum(1.0 / likely[some], _WIDER), np.ones(len(some), np.int64)
-                    )
-                )
+                wider, straight = np.minimum(1.0 / likely[some], _WIDER), np.ones(len(some), np.int64)
+                made.append(twig_buffers(flora, whole.take(some), wider, straight))
         yield from (("bark", mesh) for mesh in made if mesh is not None)
 
 
@@ -313,9 +306,8 @@ class Grid:
     def reaches(self, places: Floats, depth: Floats32, slack: float) -> Mask:
         """Places (k, 3) that nothing hides from the eye, by depths (h × w), but what is within so many meters."""
         at = in_axes(places, _axes(self.toward))
-        column, row = np.clip(
-            np.floor(at[:, :2] / self.cell).astype(np.int64) - self.low, 0, np.array(self.shape)[::-1] - 1
-        ).T
+        cells = np.floor(at[:, :2] / self.cell).astype(np.int64) - self.low
+        column, row = np.clip(cells, 0, np.array(self.shape)[::-1] - 1).T
         return at[:, 2] >= depth[row * self.shape[1] + column] - slack
 
     def _draw(self, corners: Sequence[Floats32], owner: Integers, depth: Floats32, face: Integers) -> None:
@@ -348,7 +340,6 @@ class Grid:
 
 
 def _least(parts: Sequence[Floats32]) -> Floats32:
-    """The least of three arrays (t,)."""
     return np.minimum(np.minimum(parts[0], parts[1]), parts[2])
 
 

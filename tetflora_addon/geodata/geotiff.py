@@ -51,10 +51,8 @@ def read_tiff(path: Path) -> Job[Raster]:
 
     Raises
     ------
-    OSError
-        It cannot be read.
-    SceneError
-        It is broken, or of a kind that cannot be used; names the tag.
+    OSError, SceneError
+        It cannot be read, is broken, or of a kind that cannot be used; names the tag.
     """
     check_regular(path)
     with path.open("rb") as file:
@@ -121,7 +119,6 @@ class _Tags:
         return self.file.read(number)
 
     def _number(self, letter: str, offset: int, what: str) -> int:
-        """A number in the file."""
         return struct.unpack(self.order + letter, self._bytes(offset, struct.calcsize(letter), what))[0]
 
     def _directory(self, offset: int) -> dict[str, tuple[int, int, bytes]]:
@@ -184,15 +181,13 @@ class _Tags:
         across = self.one("TileWidth") if tiled else width
         down = self.one("TileLength") if tiled else min(self.one("RowsPerStrip", height), height)
         if not (0 < across <= _LARGEST_PIECE and 0 < down <= _LARGEST_PIECE and across * down <= _MOST_PIECE):
-            raise self.broken(
-                "TileWidth" if tiled else "RowsPerStrip", f"gives pieces of {across:,} by {down:,} pixels"
-            )
+            tag = "TileWidth" if tiled else "RowsPerStrip"
+            raise self.broken(tag, f"gives pieces of {across:,} by {down:,} pixels")
         where = f"{kind.title()}Offsets"
         self.one(where)  # it is there
         offsets, sizes = self.numbers(where), self.numbers(f"{kind.title()}ByteCounts")
-        if len(offsets) != len(sizes) or any(
-            a < 0 or b < 0 or a + b > self.size for a, b in zip(offsets, sizes, strict=True)
-        ):
+        there = all(a >= 0 and b >= 0 and a + b <= self.size for a, b in zip(offsets, sizes, strict=False))
+        if len(offsets) != len(sizes) or not there:
             raise self.broken(where, f"leads beyond the end of the file; {_DAMAGED}")
         samples = 1 if self.one("PlanarConfiguration", 1) == 2 else self.one("SamplesPerPixel", 1)
         predictor, compression, order = (self.one(tag, 1) for tag in ("Predictor", "Compression", "FillOrder"))
@@ -441,7 +436,6 @@ def _packed(data: bytes, most: int) -> bytes:
 
 
 def _inflated(data: bytes, most: int) -> bytes:
-    """Deflate."""
     return zlib.decompressobj().decompress(data, most + 1)  # one more, so that the sum at the end is checked
 
 

@@ -29,10 +29,8 @@ def read_grid(path: Path) -> Job[Raster]:
 
     Raises
     ------
-    OSError
-        It cannot be read.
-    SceneError
-        It is broken; names the line or tag.
+    OSError, SceneError
+        It cannot be read, or is broken; names the line or tag.
     """
     ending = path.suffix.lower()
     if ending in (".tif", ".tiff"):
@@ -143,9 +141,8 @@ def _usgs(path: Path) -> Raster:
             number = int(content[at + 12 : at + 18])
             x, y, base = (real(at + a, at + a + 24) for a in (24, 48, 72))
             records = 1 + -(-max(number - _FIRST, 0) // _LATER)
-            if not (0 < number < 70_000 and np.isfinite((x, y, base)).all()) or at + (records - 1) * _RECORD >= len(
-                content
-            ):
+            there = at + (records - 1) * _RECORD < len(content)
+            if not (0 < number < 70_000 and np.isfinite((x, y, base)).all() and there):
                 raise ValueError
             block = content[at : at + records * _RECORD].ljust(records * _RECORD)
             text = block[144 : 144 + _FIRST * _VALUE]

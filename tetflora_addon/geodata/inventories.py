@@ -39,6 +39,7 @@ _MOST_UNKNOWN = 4  # letters that may stand beside words that are known
 _SHORTEST = 4  # letters of the beginning of a word, where a name ends after ten
 _STRONG = {"breast", "girth"}
 NEVER = 9
+_Texts = NDArray[np.str_]
 
 
 class Title(NamedTuple):
@@ -184,8 +185,7 @@ class Inventory:
     name: Integers  # (n,): index into them
     points: Floats  # (n, 2): coordinates
     system: System
-    #: ``height``, ``diameter`` (of the trunk), ``crown_width``, ``crown_base``, ``age`` and ``dead`` (years since
-    #: then), each (n,) float32.
+    #: (n,) each: ``height``, ``diameter`` of trunk, ``crown_width``, ``crown_base``, ``age``, ``dead`` (years since).
     sizes: dict[str, Floats32]
     notes: list[str] = field(default_factory=list)  # what was guessed, and which columns were used and which not
     skipped: int = 0  # rows that were broken
@@ -220,10 +220,8 @@ def read_inventory(
 
     Raises
     ------
-    OSError
-        It cannot be read.
-    SceneError
-        It is broken; names line or feature, and column.
+    OSError, SceneError
+        It cannot be read, or is broken; names line or feature, and column.
     """
     table_ = _table(path, skip, epsg=epsg)
     return _Reading(table_, units, skip, _chosen(table_, columns or {})).inventory(epsg)
@@ -234,10 +232,8 @@ def preview(path: Path) -> list[Column]:
 
     Raises
     ------
-    OSError
-        It cannot be read.
-    SceneError
-        It is broken.
+    OSError, SceneError
+        It cannot be read, or is broken.
     """
     table_ = _table(path, True, _PREVIEWED, PLAIN)
     taken = taken_for(table_, {})
@@ -260,7 +256,6 @@ def _table(path: Path, skip: bool, most: int | None = None, epsg: int = 0) -> Ta
 
 
 def _chosen(table_: Table, columns: Mapping[str, str]) -> dict[str, Title]:
-    """What was chosen for columns."""
     found = {}
     for title, text in columns.items():
         name, _, unit = text.strip().partition(" ")
@@ -301,9 +296,7 @@ def taken_for(table_: Table, chosen: Mapping[str, Title]) -> dict[str, Title]:
     return {title: found[title] for title in table_.columns}
 
 
-def _by_values(
-    found: dict[str, Title], free: list[str], samples: Mapping[str, NDArray[np.str_]], name: str, least: float
-) -> None:
+def _by_values(found: dict[str, Title], free: list[str], samples: dict[str, _Texts], name: str, least: float) -> None:
     """Take the column for a field whose values suit best."""
     shares = {title: _share(name, samples[title]) for title in free}
     best = max(shares, key=lambda title: shares[title], default="")
@@ -311,7 +304,7 @@ def _by_values(
         found[best] = Title(name, 0.0, 1)
 
 
-def _share(name: str, sample: NDArray[np.str_]) -> float:
+def _share(name: str, sample: _Texts) -> float:
     """How many of some values suit a field of names or places, 0 to 1."""
     if name == "place":
         fits = [not math.isnan(place_in(text)[0]) for text in sample.tolist()]
@@ -321,7 +314,7 @@ def _share(name: str, sample: NDArray[np.str_]) -> float:
     return sum(fits) / max(len(fits), 1)
 
 
-def _confirmed(title: Title, sample: NDArray[np.str_]) -> Title:
+def _confirmed(title: Title, sample: _Texts) -> Title:
     """A title, or one for nothing where its values cannot be what it says."""
     name, none = title.field, title._replace(field="")
     if not len(sample):
@@ -387,7 +380,7 @@ class _Reading:
             names, index[self.good], points[self.good], system, kept, self.notes, skipped, self.first, self.left_out
         )
 
-    def _texts(self, title: str) -> NDArray[np.str_]:
+    def _texts(self, title: str) -> _Texts:
         """Texts of a column, which is one that is used."""
         self.used[title] = next(name for name, found in self.found.items() if title in dict(found))
         return self.table.columns[title]
@@ -493,7 +486,6 @@ class _Reading:
         return years
 
     def _points(self, epsg: int) -> tuple[Floats, System]:
-        """Coordinates and their system."""
         name, points, system, pair = self.table.name, self.table.points, self.table.system, ("coordinates",)
         if points is None:
             degrees, meters, one = ("longitude", "latitude"), ("x", "y"), ("place",)

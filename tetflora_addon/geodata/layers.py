@@ -45,10 +45,8 @@ def read_features(path: Path, chosen: int = 0) -> tuple[list[_Feature], System]:
 
     Raises
     ------
-    OSError
-        It cannot be read.
-    SceneError
-        It is broken; names the feature.
+    OSError, SceneError
+        It cannot be read, or is broken; names the feature.
     """
     name = path.name
     if path.suffix.lower() in (".shp", ".gpkg"):
@@ -186,10 +184,8 @@ def _shapes(path: Path) -> tuple[list[_Feature], System]:
             raise ValueError
         number = len(features)
         properties = rows[number] if rows is not None and number < len(rows) else {}
-        deleted = properties is None
-        features.append(
-            {"geometry": None if deleted else _shape(record), "properties": properties or {}, LAYER: path.stem}
-        )
+        geometry = None if properties is None else _shape(record)  # it is deleted
+        features.append({"geometry": geometry, "properties": properties or {}, LAYER: path.stem})
         at += 8 + size
         if len(features) > MAX_ROWS:
             raise SceneError(f"{path.name}: more than {MAX_ROWS:,} features; cut it")

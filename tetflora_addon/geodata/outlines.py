@@ -42,6 +42,7 @@ _WORDS = {kind: _PATTERNS[kind] for kind in (BUILDING, WATER, WOOD, ROAD, MEADOW
 #: Values that are roads where they are lines.
 _ROADS = set(_WIDTHS) - {"river", "canal", "stream", "ditch", "drain"}
 _FEET = re.compile(r"(ft|feet)$")
+_Tags = dict[str, Any]
 
 
 @dataclass(frozen=True)
@@ -50,8 +51,7 @@ class MapFeature:
 
     kind: str  # one of `KINDS`
     name: str
-    #: tuple of (k, 2): coordinates. Of an area its border and the holes in it, without the last point, which is the
-    #: first; or a line.
+    #: (k, 2) each: a line, or border and holes of an area without the last point, which is the first.
     rings: tuple[Floats, ...]
     closed: bool  # whether it is an area
     #: width and height: of a line and a building, meters.
@@ -71,10 +71,8 @@ def read_outlines(path: Path, epsg: int = 0, kind: str = "") -> tuple[list[MapFe
 
     Raises
     ------
-    OSError
-        It cannot be read.
-    SceneError
-        It is broken, or has no outlines; names the feature.
+    OSError, SceneError
+        It cannot be read, is broken, or has no outlines; names the feature.
     """
     features, system = read_features(path, epsg)
     found: list[MapFeature] = []
@@ -99,9 +97,8 @@ def read_outlines(path: Path, epsg: int = 0, kind: str = "") -> tuple[list[MapFe
                 "ogr2ogr -spat"
             )
     if not found:
-        raise SceneError(
-            f"{path.name}: it has no areas and no lines" + f" but {slivers:,} of too few points" * (slivers > 0)
-        )
+        few = f" but {slivers:,} of too few points" if slivers else ""
+        raise SceneError(f"{path.name}: it has no areas and no lines{few}")
     notes = [f"{slivers:,} of too few points left out"] if slivers else []
     others = sum(feature.kind == OTHER for feature in found)
     if 2 * others > len(found):
@@ -119,9 +116,7 @@ def _rings(geometry: dict[str, Any] | None, where: str) -> Iterator[tuple[tuple[
             yield tuple(r[:-1] if len(r) > 1 and (r[0] == r[-1]).all() else r for r in rings), True
 
 
-def _outline(
-    tags: dict[str, Any], names: tuple[str, ...], rings: tuple[Floats, ...], closed: bool, chosen: str
-) -> MapFeature:
+def _outline(tags: _Tags, names: tuple[str, ...], rings: tuple[Floats, ...], closed: bool, chosen: str) -> MapFeature:
     """A feature of its kind, with width and height."""
     kind, value = _kind(tags, names, closed)
     kind = chosen or kind
@@ -138,7 +133,7 @@ def _outline(
     return MapFeature(kind, readable(name.strip(), NAME), rings, closed, width, height)
 
 
-def _kind(tags: dict[str, Any], names: tuple[str, ...], closed: bool) -> tuple[str, str]:
+def _kind(tags: _Tags, names: tuple[str, ...], closed: bool) -> tuple[str, str]:
     """Kind of a feature, and the value that tells it."""
     for key, kind in _KEYS.items():
         value = tags.get(key)
@@ -166,7 +161,7 @@ def _kind(tags: dict[str, Any], names: tuple[str, ...], closed: bool) -> tuple[s
     return OTHER, ""
 
 
-def _measured(tags: dict[str, Any], usual: str, keys: re.Pattern) -> float:
+def _measured(tags: _Tags, usual: str, keys: re.Pattern) -> float:
     """The first measure under the usual key, or under any whose letters fit."""
     if found := _measure(tags.get(usual)):
         return found
@@ -179,9 +174,8 @@ def _measured(tags: dict[str, Any], usual: str, keys: re.Pattern) -> float:
 
 def _measure(value: Any) -> float:
     """Meters of a width or height, or a number; 0 for what tells none. Maps have texts of all kinds there."""
-    found = (
-        re.match(r"[~≈\s]*(\d+(?:[.,]\d+)?)\s*(m|ft|')?", str(value)) if isinstance(value, str | int | float) else None
-    )
+    text = str(value) if isinstance(value, str | int | float) else ""
+    found = re.match(r"[~≈\s]*(\d+(?:[.,]\d+)?)\s*(m|ft|')?", text)
     if found is None:
         return 0.0
     return float(found[1].replace(",", ".")[:20]) * (0.3048 if found[2] in ("ft", "'") else 1.0)

@@ -93,9 +93,8 @@ class Ellipsoid:
         """Places (n, 3) on the ellipsoid, meters from the middle of the Earth."""
         nu = self.a / np.sqrt(1.0 - self.e2 * np.sin(latitude) ** 2)
         flat = nu * np.cos(latitude)
-        return np.stack(
-            [flat * np.cos(longitude), flat * np.sin(longitude), nu * (1.0 - self.e2) * np.sin(latitude)], axis=1
-        )
+        up = nu * (1.0 - self.e2) * np.sin(latitude)
+        return np.stack([flat * np.cos(longitude), flat * np.sin(longitude), up], axis=1)
 
     def of(self, places: Floats) -> _Pair:
         """Longitude and latitude of places (n, 3) near the ellipsoid."""
@@ -332,8 +331,7 @@ TRUE = {"tm", "lcc1", "lcc2", "sterea", "omercA", "omercB"}
 class System:
     """A coordinate system."""
 
-    #: EPSG; 0 for a plane in meters of which nobody knows where on Earth it lies, -1 for one about a place, -2 for one
-    #: that a file defines by itself.
+    #: EPSG; 0 for a plane in meters at no known place, -1 for one about a place, -2 for one of the file itself.
     epsg: int = 0
     #: longitude and latitude: the place, degrees.
     longitude: float = 0.0
@@ -528,11 +526,8 @@ def place_about(system: System, low: Floats, high: Floats, what: str = "") -> Ma
                 readable(f"{what}{longitude:g}, {latitude:g} is no longitude and latitude with room about it")
             )
         place = MapOrigin(System(-1, longitude, latitude), 0.0, 0.0)
-    sides = between(
-        np.array([[low[0], middle[1]], [high[0], middle[1]], [middle[0], low[1]], [middle[0], high[1]]]),
-        system,
-        place.system,
-    )
+    ends = np.array([[low[0], middle[1]], [high[0], middle[1]], [middle[0], low[1]], [middle[0], high[1]]])
+    sides = between(ends, system, place.system)
     width, depth = np.linalg.norm(sides[1::2] - sides[::2], axis=1) / 1000.0
     if not max(width, depth) < 2.0 * MOST_AWAY / 1000.0:
         raise SceneError(
@@ -750,13 +745,11 @@ def _old(text: str) -> System:
         zone = int(float(words["zone"]))
         south = zone < 0 or float(words.get("yshift", "0")) < 0
         return described("transverse", utm_zone(abs(zone), south), datum)
-    keys = (
-        ("scale", "longitude", "latitude") if name.startswith("TRANS") else ("first", "second", "longitude", "latitude")
-    )
+    keys = ("scale",) if name.startswith("TRANS") else ("first", "second")
     numbers = []
     for line in tail.splitlines():
         parts = [float(word) for word in re.sub(r"/\*.*", "", line).split()]
         if parts:
             sign = -1.0 if line.strip().startswith("-") else 1.0
             numbers.append(sign * sum(abs(part) / 60.0**power for power, part in enumerate(parts)))
-    return described(name, dict(zip((*keys, "east", "north"), numbers, strict=False)), datum)
+    return described(name, dict(zip((*keys, "longitude", "latitude", "east", "north"), numbers, strict=False)), datum)

@@ -163,10 +163,8 @@ def read_ascii(path: Path) -> Job[Raster]:
 
     Raises
     ------
-    OSError
-        It cannot be read.
-    SceneError
-        It is broken; names the line.
+    OSError, SceneError
+        It cannot be read, or is broken; names the line.
     """
     content = read_whole(path, MAX_TEXT)
     name, header, start = path.name, {}, 0
@@ -306,9 +304,8 @@ def world_file(path: Path) -> list[Floats]:
     lines = read_whole(found, _SMALL).decode("latin-1").split()
     if len(lines) != 6:
         raise SceneError(f"{found.name}: {len(lines)} numbers; a world file has six, one on each line; correct it")
-    a, d, b, e, x, y = (
-        _number(text.replace(",", "."), f"{found.name}: line {number}") for number, text in enumerate(lines, 1)
-    )
+    numbered = enumerate(lines, 1)
+    a, d, b, e, x, y = (_number(text.replace(",", "."), f"{found.name}: line {number}") for number, text in numbered)
     if not abs(a * e - b * d) > 0.0:
         raise SceneError(f"{found.name}: line 1: its cells have no size; correct it")
     return [np.array([x, y]), np.array([a, d]), np.array([b, e])]

@@ -65,10 +65,8 @@ def read_csv(path: Path, skip: bool = False, most: int | None = None) -> Table:
 
     Raises
     ------
-    OSError
-        It cannot be read.
-    SceneError
-        It is broken; names the line.
+    OSError, SceneError
+        It cannot be read, or is broken; names the line.
     """
     content = read_whole(path, MAX_BYTES)
     name = path.name
@@ -127,10 +125,8 @@ def read_points(path: Path, _skip: bool = False, most: int | None = None, chosen
 
     Raises
     ------
-    OSError
-        It cannot be read.
-    SceneError
-        It is broken; names the feature.
+    OSError, SceneError
+        It cannot be read, or is broken; names the feature.
     """
     features, system = read_features(path, chosen)
     name, without = path.name, 0
@@ -153,12 +149,10 @@ def _points_of(geometry: dict[str, Any] | None, where: str) -> Floats:
     """Places (n, 2) of a geometry: its points, or the middle of its first area."""
     parts = list(parts_of(geometry, where))
     points = [values for kind, values in parts if kind == "Point"]
-    area = next(
-        (values[0] for kind, values in parts if kind == "Polygon" and isinstance(values, list) and values), None
-    )
-    if points or area is None:
+    areas = [values for kind, values in parts if kind == "Polygon" and isinstance(values, list) and values]
+    if points or not areas:
         return coordinates(points, where, texts=True)
-    return np.array([middle_of(coordinates(area, where, texts=True))])
+    return np.array([_middle(coordinates(areas[0][0], where, texts=True))])
 
 
 def flat_tags(properties: dict[str, Any]) -> dict[str, Any]:
@@ -232,14 +226,8 @@ class Quantity(NamedTuple):
     kind: int = NUMBER
 
 
-def cell_of(text: str, points: bool = False) -> Quantity:
-    """What a cell says.
-
-    Parameters
-    ----------
-    points : bool
-        Other cells have decimal points, so that a comma before three digits parts thousands.
-    """
+def _cell(text: str, points: bool) -> Quantity:
+    """What a cell says; where others have decimal points, a comma before three digits parts thousands."""
     text = text.strip().lower().strip("*").strip()
     if text in _MISSING:
         return Quantity(0.0, kind=NOTHING)
@@ -247,7 +235,7 @@ def cell_of(text: str, points: bool = False) -> Quantity:
         return Quantity(0.0, kind=WORD)
     aside = re.fullmatch(r"([^()]*)\(([^()]*)\)([^()]*)", text)  # "small (0-15 ft)", "12 m (measured)"
     if aside is not None:
-        inner, outer = cell_of(aside[2], points), cell_of(aside[1] + aside[3], points)
+        inner, outer = _cell(aside[2], points), _cell(aside[1] + aside[3], points)
         return inner if inner.kind == RANGE or outer.kind in (NOTHING, WORD) else outer
     found = _SHAPE.fullmatch(text)
     if found is None:
@@ -255,11 +243,8 @@ def cell_of(text: str, points: bool = False) -> Quantity:
     low, high = _value(found["low"], points), _value(found["high"], points) if found["high"] else math.nan
     unit = _unit(found["second"] or found["first"])
     if found["high"] is None:
-        first = _unit(found["first"])
-        value = low / 2.0 if found["less"] else low
-        return Quantity(
-            value, first, RANGE if found["less"] or found["more"] or found["plus"] or found["over"] else NUMBER
-        )
+        open_ = any(found[mark] for mark in ("less", "more", "plus", "over"))
+        return Quantity(low / 2.0 if found["less"] else low, unit, RANGE if open_ else NUMBER)
     if found["first"] and not found["sep"]:
         return Quantity(math.nan, kind=WRONG)
     if found["sep"] in ("/", ";", "+"):  # several stems
@@ -290,7 +275,7 @@ def cells(texts: NDArray[np.str_]) -> tuple[Floats, Floats, Integers]:
     distinct, index = np.unique(texts, return_inverse=True)
     points = any("." in text for text in distinct.tolist())
     found = [
-        Quantity(float(text)) if _FLOAT.fullmatch(text) else _in_parts(text) or cell_of(text, points)
+        Quantity(float(text)) if _FLOAT.fullmatch(text) else _in_parts(text) or _cell(text, points)
         for text in distinct.tolist()
     ]
     values, units, kinds = (np.array(column) for column in zip(*found, strict=True))
@@ -312,9 +297,7 @@ def _in_parts(text: str) -> Quantity | None:
 
 _ANGLE = r"(-)?(\d{1,3})\s*[°º]\s*(\d{1,2})\s*['′’]\s*(\d{1,2}(?:[.,]\d+)?)?\s*(?:\"|″|”|'')?\s*([NSEW])?"
 _PAIR = re.compile(r"\(?\s*(-?\d+(?:[.,]\d+)?)°?\s*[,;/ ]\s*(-?\d+(?:[.,]\d+)?)°?\s*\)?")
-_WELL_KNOWN = re.compile(
-    r"(?:srid=(\d+);\s*)?(?:multi)?(?:point|polygon|linestring)\s*(?:zm?|m)?\s*\((.*)\)", re.IGNORECASE
-)
+_WELL_KNOWN = re.compile(r"(?i)(?:srid=(\d+);\s*)?(?:multi)?(?:point|polygon|linestring)\s*(?:zm?|m)?\s*\((.*)\)")
 
 
 def place_in(text: str) -> tuple[float, float, int]:
@@ -343,9 +326,9 @@ def place_in(text: str) -> tuple[float, float, int]:
         if known is not None:
             first = known[2].lstrip("( ").split(")")[0]
             points = [[float(number) for number in point.strip("() ").split()[:2]] for point in first.split(",")]
-            return *middle_of(points), int(known[1] or 0)
+            return *_middle(points), int(known[1] or 0)
         if text.strip().startswith("{"):
-            return *middle_of(_positions(json.loads(text).get("coordinates"))), 0
+            return *_middle(_positions(json.loads(text).get("coordinates"))), 0
     except (ValueError, TypeError, AttributeError, IndexError, OverflowError, RecursionError, struct.error):
         pass
     return math.nan, math.nan, 0
@@ -358,14 +341,8 @@ def _positions(values: object) -> list[list[float]]:
     return values if isinstance(values, list) and values and isinstance(values[0], list) else [values]  # type: ignore
 
 
-def middle_of(points: Sequence[Sequence[float]]) -> tuple[float, float]:
-    """The centroid of a ring (n, 2), or the mean of less than three points.
-
-    Raises
-    ------
-    ValueError
-        They are no points.
-    """
+def _middle(points: Sequence[Sequence[float]]) -> tuple[float, float]:
+    """The centroid of a ring (n, 2), or the mean of less than three points; an error where they are none."""
     ring = np.array([(x, y) for x, y, *_ in points], np.float64).reshape(-1, 2)
     if not np.isfinite(ring).all() or not len(ring):
         raise ValueError

@@ -137,13 +137,11 @@ class LightBuffer:
             u, v = (part + 0.5) / number[owner], ((part - (number[owner] - 1) / 2.0) * _GOLDEN + 0.5) % 1.0
             weights = (1.0 - u) * (1.0 - v), u * (1.0 - v), u * v, (1.0 - u) * v
             points = sum(c.take(owner, axis=1) * weight for c, weight in zip(corners, weights, strict=True)).T
-            owner, pixel, meters, fraction = self._gathered_parts(points, owner, covered)
+            owner, pixel, meters, fraction = self._by_pixel(points, owner, covered)
             depth = -np.log1p(-np.minimum(fraction, _MOST_COVERED))
             yield numbers[owner].astype(np.int32), pixel.astype(np.int32), meters, np.zeros(len(owner)), depth
 
-    def _gathered_parts(
-        self, points: Floats, owner: Integers, covered: Floats
-    ) -> tuple[Integers, Integers, Floats, Floats]:
+    def _by_pixel(self, points: Floats, owner: Integers, covered: Floats) -> tuple[Integers, Integers, Floats, Floats]:
         """Parts of sheets by sheet and nearest pixel: both (f,), mean distance (f,), and the fraction that they cover.
 
         Parts are at ``points`` (m, 3), of sheets ``owner`` (m,); each of sheet i covers ``covered[i]`` of a pixel.
@@ -152,9 +150,8 @@ class LightBuffer:
         owner = owner[inside]
         column, row = np.clip(np.ceil(place).astype(np.int64) - 1, 0, [self.width - 1, self.height - 1]).T
         nearest = row * self.width + column
-        key, first, own = np.unique(
-            owner * (self.width * self.height) + nearest, return_index=True, return_inverse=True
-        )
+        both = owner * (self.width * self.height) + nearest
+        key, first, own = np.unique(both, return_index=True, return_inverse=True)
         fraction = np.bincount(own.ravel(), covered[owner], len(key))
         meters = np.bincount(own.ravel(), meters, len(key)) / np.maximum(np.bincount(own.ravel()), 1)
         return owner[first], nearest[first], meters, fraction
@@ -261,14 +258,11 @@ class LightBuffer:
         place = place - 0.5
         low = np.floor(place)
         fraction = place - low
-        pixels, weights = [], []
-        for up in (0, 1):
-            for aside in (0, 1):
-                column = np.clip(low[:, 0] + aside, 0, self.width - 1).astype(np.int64)
-                row = np.clip(low[:, 1] + up, 0, self.height - 1).astype(np.int64)
-                pixels.append(row * self.width + column)
-                weights.append(np.abs(1 - aside - fraction[:, 0]) * np.abs(1 - up - fraction[:, 1]))
-        return _Taps(np.stack(pixels, axis=1), np.stack(weights, axis=1), meters), inside
+        aside, up = np.array([[0, 1, 0, 1], [0, 0, 1, 1]])
+        column = np.clip(low[:, :1] + aside, 0, self.width - 1).astype(np.int64)
+        row = np.clip(low[:, 1:] + up, 0, self.height - 1).astype(np.int64)
+        weight = np.abs(1 - aside - fraction[:, :1]) * np.abs(1 - up - fraction[:, 1:])
+        return _Taps(row * self.width + column, weight, meters), inside
 
     def _last_before(self, taps: _Taps) -> tuple[Integers, Mask]:
         """The last fragment (k, 4) that begins in front of each point in each pixel, and whether there is one."""

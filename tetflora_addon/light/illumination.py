@@ -60,7 +60,7 @@ class LampBuffers:
 
 
 class Illumination:
-    """Light in a scene, as `shadow_steps` finds it.
+    """Light in a scene, as `_shadow_steps` finds it.
 
     Attributes
     ----------
@@ -178,7 +178,7 @@ class Illumination:
         return self.cloud_radiance(around, camera, c.plane[cells]).reshape(-1, 4, 3)
 
     def scatter(self, ground: Floats, orders: int) -> Iterator[float]:
-        """Sample the sky at the key points, then scatter; the last step of `shadow_steps`.
+        """Sample the sky at the key points, then scatter; the last step of `_shadow_steps`.
 
         Light is reflected by polygons of color ``ground`` (3,). So many ``orders`` are gathered one by one; the rest
         is their geometric series. Yields the fraction that is done.
@@ -276,8 +276,7 @@ ORDERS = 2
 FRONT, BACK = "tf_light_front", "tf_light_back"
 #: Maximum longer side in pixels of a lamp's buffer, with ground in it and without.
 GROUND_PIXELS, OPEN_PIXELS = 1024, 4096
-#: Suns have views of their own of what is nearer to the camera than these fractions of the distance to the farthest
-#: leaf, if so many sheets are there.
+#: Suns have own views of what is nearer than these fractions of the distance to the farthest leaf, of so many sheets.
 NEAR_FRACTIONS, NEAR_SHEETS = (1 / 32, 1 / 8), 1000
 
 
@@ -296,7 +295,7 @@ class Sources:
         return replace(self, lights=lights, occluders=self.occluders - origin)
 
 
-def shadow_steps(
+def _shadow_steps(
     clouds: MediumCells,
     sources: Sources,
     resolution: int = 512,
@@ -306,20 +305,9 @@ def shadow_steps(
 ) -> Generator[float, None, Illumination]:
     """Render a scene from all of its lights; yields the fraction that is done.
 
-    Penumbras of the sun and of lamps that are no areas are as sharp as the buffer.
-
-    Parameters
-    ----------
-    clouds : MediumCells
-        All tetrahedra that hold something.
-    resolution : int
-        Longer side of a lamp's buffer, pixels; see `light_resolution`. The sky's are `SKY_FRACTION` of it.
-    sheets : SurfaceElements, optional
-        Facets and leaves as they are drawn: clumps shadow themselves, as no even cloud does. Pixels should match them.
-    near : Near, optional
-        Part of the scene that gets buffers of its own from suns.
-    orders : int
-        Orders of scattering that are gathered one by one, at least 1.
+    Penumbras of the sun and of lamps that are no areas are as sharp as the buffer, whose longer side has so many
+    pixels; the sky's are `SKY_FRACTION` of it. Clumps of sheets shadow themselves, as no even cloud does. So many
+    orders of scattering, at least 1, are gathered one by one.
     """
     sheets = SurfaceElements.none(len(clouds)) if sheets is None else sheets
     lamps, split, occluders = [], split_areas(tuple(sources.lights)), sources.occluders
@@ -466,5 +454,5 @@ def baked_light(
             away = np.linalg.norm(corners[:, 0] - camera.eye, axis=1)
             radii = (fraction * away.max() for fraction in NEAR_FRACTIONS)
             near = Near(camera.eye, tuple(r for r in radii if (away < r).sum() >= NEAR_SHEETS))
-    found = yield from shadow_steps(clouds, sources, resolution, sheets, near)
+    found = yield from _shadow_steps(clouds, sources, resolution, sheets, near)
     return BakedLight(found, inside, camera)

@@ -19,6 +19,8 @@ from ..optics import GLOSS, THROUGH_TINT
 
 #: Reflected (n, 3), transmitted (n, 3) and mirrored (n,) fractions of light, see `scattered_fractions`.
 Fractions = tuple[Floats, Floats, Floats]
+#: Radiance of the front, where normals point, and of the back (n, 3 each).
+Sides = tuple[Floats, Floats]
 
 #: Number of harmonics up to the second band, and the band of each.
 HARMONICS = 9
@@ -119,9 +121,7 @@ def _bands() -> Floats:
 _PHASE_BANDS = _bands()
 
 
-def facet_direct(
-    normal: Floats, fractions: Fractions, toward: Floats, arriving: Floats, view: Floats
-) -> tuple[Floats, Floats]:
+def facet_direct(normal: Floats, fractions: Fractions, toward: Floats, arriving: Floats, view: Floats) -> Sides:
     """Radiance of the front, where normals point, and of the back of facets (n, 3 each) by one light.
 
     All vectors (n, 3) are unit vectors, ``view`` to the eye; ``arriving`` (n, 3) is W/m² on what faces the light.
@@ -135,7 +135,7 @@ def facet_direct(
     return np.where(lit, same, other), np.where(lit, other, same)
 
 
-def facet_ambient(normal: Floats, fractions: Fractions, light: Floats, view: Floats) -> tuple[Floats, Floats]:
+def facet_ambient(normal: Floats, fractions: Fractions, light: Floats, view: Floats) -> Sides:
     """Radiance of the front and the back of facets (n, 3 each) by light from all sides, as harmonics (n, 9, 3)."""
     reflected, through, gloss = fractions
     front, back = irradiance(light, normal) / np.pi, irradiance(light, -normal) / np.pi
@@ -154,9 +154,8 @@ def _mirrored(normal: Floats, toward: Floats, view: Floats) -> Floats:
     spread = np.sum(normal * half, axis=1) ** 2 * (alpha - 1.0) + 1.0
     density = alpha / (np.pi * spread * spread)
     inwards, outwards = np.abs(light), np.abs(eye)
-    masking = inwards * np.sqrt(alpha + (1.0 - alpha) * eye * eye) + outwards * np.sqrt(
-        alpha + (1.0 - alpha) * light * light
-    )
+    of_eye, of_light = (np.sqrt(alpha + (1.0 - alpha) * one * one) for one in (eye, light))
+    masking = inwards * of_eye + outwards * of_light
     # None where light and eye are on different sides.
     return np.where(light * eye > 0.0, density * inwards / (2.0 * np.maximum(masking, 1e-9)), 0.0)
 

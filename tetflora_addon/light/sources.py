@@ -135,14 +135,9 @@ def light_resolution(camera: Camera) -> int:
 
 
 def buffers_of(
-    light: Light,
-    clouds: MediumCells,
-    sheets: SurfaceElements,
-    occluders: Floats | None,
-    resolution: int,
-    near: Near | None = None,
+    light: Light, clouds: MediumCells, sheets: SurfaceElements, occluders: Floats, pixels: int, near: Near | None = None
 ) -> list[LightBuffer]:
-    """Buffers in which a light sees tetrahedra, sheets and polygons: one, six all around, or none.
+    """Buffers, of so many pixels along, in which a light sees all in its way: one, six all around, or none.
 
     A sun has further ones before it for what is ``near``, with smaller pixels.
     """
@@ -151,16 +146,16 @@ def buffers_of(
     corners, sun = clouds.vertices.reshape(-1, 3), light.kind == "SUN"
     if sun:
         # Occluders affect how far the view reaches, not how wide it is.
-        every = corners if occluders is None else np.concatenate([corners, occluders.reshape(-1, 3)])
-        views = light_views(light, clouds.vertices, every, resolution)
+        every = np.concatenate([corners, occluders.reshape(-1, 3)])
+        views = light_views(light, clouds.vertices, every, pixels)
         views = [closer for view in views for closer in _closer(view, near)] + views if near else views
     else:
-        views = lamp_views(light.position, corners, resolution)
+        views = lamp_views(light.position, corners, pixels)
     made = []
     for view in views:
         along = light.direction if sun else -to_eye(view, clouds.vertices.mean(axis=1))
         extinction = np.where(sheets.replaced, 0.0, clouds.extinction(along))
-        made.append(LightBuffer(view, resolution, clouds.vertices, extinction, occluders, sheets.corners))
+        made.append(LightBuffer(view, pixels, clouds.vertices, extinction, occluders, sheets.corners))
     return made
 
 

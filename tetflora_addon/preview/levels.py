@@ -139,17 +139,14 @@ def _level(flora: Flora, state: Refinement) -> Level:
         visibility=state.transmittance.astype(np.float32),
         contribution=contributions(state.cells, state.transmittance).astype(np.float32),
         extinction=extinction.astype(np.float32),
-        color=mean_colors(flora, state.contents, nodes, len(tree)).astype(np.float32),
+        color=_mean_colors(flora, state.contents, nodes, len(tree)).astype(np.float32),
         figures=step_of(state),
         number=state.passes - 1,
     )
 
 
-def mean_colors(flora: Flora, contents: Contents, nodes: Integers, size: int) -> Floats:
-    """Mean colors (t, 3) of what nodes (t,) hold, weighted by what shows: leaves once, closed surfaces half.
-
-    Unlike `refinement.summaries` without orientation and clumping, which a preview does not show.
-    """
+def _mean_colors(flora: Flora, contents: Contents, nodes: Integers, size: int) -> Floats:
+    """Mean colors (t, 3) of what nodes (t,) hold, weighted by what shows: leaves once, closed surfaces half."""
     row, piece_row = contents.subplants.items.row, contents.pieces.items.branches.row
     parts = []
     for held, leaf_colors, wood in (
@@ -200,10 +197,7 @@ def colors_of(level: Level, mode: str, deepest: int) -> Floats32:
     if mode == "CONTRIBUTION":
         return ramp(np.log(np.maximum(level.contribution, _LEAST) / _LEAST) / np.log(_MOST / _LEAST))
     if mode == "FORM":
-        table = np.zeros((len(Decision), 3), np.float32)
-        for decision, color in FORMS.items():
-            table[decision] = color
-        return table[level.decision]
+        return np.array([FORMS.get(one, (0.0, 0.0, 0.0)) for one in Decision], np.float32)[level.decision]
     raise ValueError(f'unknown color mode "{mode}"; use LEVEL, VISIBILITY, FORM or CONTRIBUTION')
 
 
@@ -241,8 +235,7 @@ _CASES = _cases()
 class Projected:
     """Tetrahedra as triangles, in the order of the tetrahedra."""
 
-    #: (n, 5, 3): the four vertices, on which opacity is 0, and the nearest point of the ray on which each tetrahedron
-    #: is thickest; world space, meters.
+    #: (n, 5, 3): the vertices, where opacity is 0, and the nearest point of the ray on which each is thickest; meters.
     corners: Floats
     opacity: Floats  # (n,): of the thick point: 1 − e^(−κ · thickness)
     thickness: Floats  # (n,): along that ray, meters
@@ -266,13 +259,11 @@ def project(vertices: Floats, extinction: Floats, camera: Camera) -> Projected:
         Of either orientation, meters, world space, all `drawable`. In the order in which they are to be drawn.
     extinction : (n,) float64
         κ ≥ 0, 1/m.
-    camera : Camera
-        Perspective or orthographic; panoramas have no straight edges.
 
     Raises
     ------
     ValueError
-        If the camera is a panorama.
+        The camera is a panorama, where no edges are straight.
     """
     if camera.kind == "PANO":
         raise ValueError("a panorama bends the edges of tetrahedra; use a perspective or orthographic camera")

@@ -100,7 +100,8 @@ def light_plants(flora: Flora, seeds: Seeds, most: int = MOST_FACES) -> Shapes:
     # The wood's own radius would be less than a pixel in the view of a forest.
     foot = np.maximum(trunk.radius, _THIN * length)
     reach = 1.0 + light @ _AROUND[:, :2].T
-    positions, colors = _crowns(trunk.position, trunk.frame, heights, widths, foot, leaves, wood, reach)
+    forms = np.column_stack([heights, widths])
+    positions, colors = _crowns(trunk.position, trunk.frame, forms, foot, leaves, wood, reach)
     return Shapes(positions, colors, _repeated(_faces(), len(_NORMALS), len(trunk)), len(trunk), of, origin)
 
 
@@ -115,26 +116,19 @@ def _looks(flora: Flora, trunk: Branches) -> tuple[Floats, Floats, Floats]:
 
 
 def _crowns(
-    feet: Floats,
-    frame: Floats,
-    heights: Floats,
-    widths: Floats,
-    foot: Floats,
-    leaves: Floats,
-    wood: Floats,
-    reach: Floats | float = 1.0,
+    feet: Floats, frame: Floats, forms: Floats, foot: Floats, leaves: Floats, wood: Floats, reach: Floats | float = 1.0
 ) -> tuple[Floats32, Floats32]:
     """Corners (v, 3) of crowns and trunks of n plants, and their colors as a screen shows them.
 
     Meters: feet (n, 3), axes of trunks (n, 3, 3), heights of the lowest and highest leaves and radii of two rings
-    (n, 2), radii of trunks (n,), and factors on radii to all sides (n, `SIDES`). Linear RGB (n, 3) of leaves and wood.
+    (n, 4), radii of trunks (n,), and factors on radii to all sides (n, `SIDES`). Linear RGB (n, 3) of leaves and wood.
     """
     # Of single precision, as screens need no more: seasons go by while one looks on.
     local = np.zeros((len(feet), len(_NORMALS), 3), np.float32)
-    for ring, radius in zip((_LOWER, _UPPER), widths.T, strict=True):
+    low, high, *radii = forms.T
+    for ring, radius in zip((_LOWER, _UPPER), radii, strict=True):
         local[:, ring] = (radius[:, None] * reach)[:, :, None] * _AROUND
     local[:, _FOOT] = foot[:, None, None] * _AROUND
-    low, high = heights.T
     local[:, _CROWN, 2] = low[:, None] + (high - low)[:, None] * _HEIGHTS
     local[:, -1, 2] = low + 0.5 * (high - low)
     frame = frame.astype(np.float32)
@@ -207,9 +201,9 @@ def with_faces(shapes: Shapes, some: Integers | slice = slice(None)) -> Shapes:
     across = np.cross(up, np.where(np.abs(up[:, :1]) < 0.9, [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]))
     across /= np.linalg.norm(across, axis=1, keepdims=True)
     frame = np.stack([across, np.cross(up, across), up], axis=2)
-    widths = looks[:, 3:4] * forms[:, 2:]
-    corners = crowns.positions[some], frame, forms[:, :2], widths, _THIN * forms[:, 1], looks[:, :3], looks[:, 4:]
-    positions, colors = _crowns(*corners)
+    shown = np.column_stack([forms[:, :2], looks[:, 3:4] * forms[:, 2:]])
+    foot, leaves, wood = _THIN * forms[:, 1], looks[:, :3], looks[:, 4:]
+    positions, colors = _crowns(crowns.positions[some], frame, shown, foot, leaves, wood)
     indices = _repeated(_faces(), len(_NORMALS), len(up))
     return Shapes(positions, colors, indices, len(up), shapes.of, shapes.origin)
 
@@ -345,8 +339,8 @@ def simple_crowns(
         colors = np.repeat(as_shown(leaves), len(corners), axis=0)
     else:
         radius, base, top = np.full((3, len(shown)), np.array(size)[:, None])
-        heights, widths = np.column_stack([base, top]), np.column_stack([radius, radius])
-        positions, colors = _crowns(feet, frame, heights, widths, _THIN * top, leaves, wood)
+        forms = np.column_stack([base, top, radius, radius])
+        positions, colors = _crowns(feet, frame, forms, _THIN * top, leaves, wood)
         indices = _faces()
     indices = _repeated(indices, len(positions) // max(len(shown), 1), len(shown))
     return Shapes(positions, colors, indices, len(shown), of, origin)

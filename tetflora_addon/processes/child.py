@@ -38,10 +38,8 @@ def engine(package: str) -> None:
         module = ModuleType(name)
         module.__path__ = []
         sys.modules[name] = module
-    folder = Path(__file__).resolve().parent.parent
-    spec = importlib.util.spec_from_file_location(
-        package, folder / "__init__.py", submodule_search_locations=[str(folder)]
-    )
+    here = Path(__file__).resolve().parent.parent
+    spec = importlib.util.spec_from_file_location(package, here / "__init__.py", submodule_search_locations=[str(here)])
     module = importlib.util.module_from_spec(spec)
     sys.modules[package] = module
     spec.loader.exec_module(module)

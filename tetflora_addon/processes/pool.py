@@ -214,13 +214,7 @@ class _Child:
         self.peak = 0
 
     def greet(self) -> bool:
-        """Wait until it is there; whether it still is: it ends by itself when there is nothing to do.
-
-        Raises
-        ------
-        _StartError
-            It never was.
-        """
+        """Wait until it is there, or raise `_StartError`; whether it still is: without work it ends by itself."""
         if not self._ready:
             timer = threading.Timer(_PATIENCE, self.kill)
             timer.daemon = True
@@ -237,13 +231,7 @@ class _Child:
         return self.runs
 
     def call(self, function: Callable, shared: _Given, item: object) -> tuple[str, object, str]:
-        """What becomes of a call: "made" and the result, or "failed" and the error, with where it was.
-
-        Raises
-        ------
-        Closed, OSError
-            The process has ended.
-        """
+        """What a call made, after "made"; or after "failed" its error, and where it was. Raises as `forget`."""
         self.forget()
         if shared.number not in self._known:
             send(self._process.stdin, "share", shared.number, shared.packed())
@@ -253,13 +241,7 @@ class _Child:
         return answer
 
     def forget(self) -> None:
-        """Let go of what no call will need again.
-
-        Raises
-        ------
-        Closed, OSError
-            The process has ended.
-        """
+        """Let go of what no call will need again; `Closed` or `OSError` where the process has ended."""
         for number in [number for number, given in self._known.items() if given.forgotten]:
             del self._known[number]
             send(self._process.stdin, "forget", number)
@@ -350,7 +332,6 @@ def _tidy() -> None:
 
 
 def _start_all() -> None:
-    """Start all processes."""
     while True:
         with _pool.changed:
             if len(_pool.children) >= number() or (own := _started()) is None:

@@ -41,8 +41,7 @@ from ..storage import cached
 from ..subplants.pieces import Pieces, open_subplants
 from .microsurfaces import CIRCUMRADIUS, SIN_60, FacetRules, Facets, by_number, piece_facets, subplant_facets
 
-#: Weights of the shipped species, made by ``python -m devtools.facet_tables``. Raise `_METHOD` when facets or weights
-#: are made differently.
+#: Weights of the shipped species, by ``python -m devtools.facet_tables``. Raise `_METHOD` when they are made otherwise.
 TABLE = Path(__file__).resolve().parent.parent / "catalog" / "tables" / "facet_weights.json"
 _METHOD = 3
 #: Facets of a sub-plant for which weights are known; in between, weights are linear in the logarithm.
@@ -55,8 +54,7 @@ _POLYGONS_OF_SOLIDS = 400_000.0
 #: skipped; after more than the third no larger number is tried.
 _WANTED, _NEEDED, _MOST = 250.0, 60.0, 5_000.0
 _COPIES = 16
-#: Blocked rays from which the weights of species that are not shipped follow, about; and the facets, over all views,
-#: that may lie in the way of each.
+#: Blocked rays that weights of other species follow from, about; facets, over all views, that may block each.
 RAYS, _PAIRS = 6_000.0, 40.0
 #: Name of the results in the cache folder. The first method, with all rays, had another.
 _KIND = "facet_shares"
@@ -112,7 +110,7 @@ def facet_weights(flora: Flora, species: Collection[int] | None = None) -> Facet
     """
     every = sorted(set(range(len(flora.species)) if species is None else species))
     run_to_end(measuring(flora, every))
-    return _of_states(flora.in_leaf, tuple((number, states_of(flora, number)) for number in every))
+    return _of_states(flora.in_leaf, tuple((number, _states_of(flora, number)) for number in every))
 
 
 @lru_cache(maxsize=8)
@@ -120,7 +118,7 @@ def _of_states(flora: Flora, species: tuple[tuple[int, tuple[int, ...]], ...]) -
     number = 1 + max((state for _, states in species for state in states), default=0)
     weights = np.ones((2, number, len(flora.rows), len(COUNTS)))
     for one, states in species:
-        found = weights_of(flora, one, states, _known)
+        found = _weights_of(flora, one, states, _known)
         weights[:, : found.shape[1], flora.rows["species"] == one] = found
     return FacetWeights(*weights, are_solids(flora.rows))
 
@@ -179,8 +177,6 @@ def fitting(flora: Flora, number: int, rays: float = np.inf) -> Generator[float,
 
     Parameters
     ----------
-    number : int
-        Index of the species.
     rays : float
         Blocked rays that each weight is to follow from, about; the lattice is made coarser where there are more.
 
@@ -246,16 +242,13 @@ def _apart(flora: Flora, families: list[Branches]) -> tuple[Branches, Floats]:
 def _fitted(
     sight: "SiblingGroups", rays: float, seen: "dict[object, list[tuple[View, Integers]]]"
 ) -> Generator[float, None, Floats]:
-    """Weights (k,) for one row; yields the fraction that is done.
-
-    What rays meet is looked up in ``seen``, and noted there.
-    """
+    """Weights (k,) for one row, by what rays meet, which ``seen`` remembers; yields the fraction that is done."""
     out = np.full(len(COUNTS), np.nan)
     if sight.area.mean() <= 0.0:
         return np.ones(len(COUNTS))
     if sight.content not in seen:
         looked = []
-        for view in cast_rays(sight.grown(), sight.beyond):
+        for view in _cast_rays(sight.grown(), sight.beyond):
             looked.append(view)
             yield 0.05 * len(looked)
         seen[sight.content] = looked
@@ -367,11 +360,8 @@ class SiblingGroups:
         return replace(branches, key=key, position=branches.position + number * self.beyond)
 
 
-def cast_rays(things: PlantElements, beyond: Floats) -> Iterator[tuple[View, Integers]]:
-    """Views of families, and the numbers (m,) of the rays of each that meet anything.
-
-    Directions are spread over the half sphere; the lattice is as fine for all of them.
-    """
+def _cast_rays(things: PlantElements, beyond: Floats) -> Iterator[tuple[View, Integers]]:
+    """Views of families from all around, and the numbers (m,) of the rays of each that meet anything."""
     along = np.floor(beyond @ things.middle / (beyond @ beyond) * FAMILIES + 0.5)
     extent = 2.0 * float(things.radius.max())  # one straight branch has no extent but its own
     for family in np.unique(along):
@@ -454,11 +444,8 @@ def leaf_shares(flora: Flora, subplants: Branches) -> Floats | None:
     return leafiness if share is None else share * leafiness
 
 
-def states_of(flora: Flora, number: int) -> tuple[int, ...]:
-    """Indices of `SHARES` between which plants of a species are on the day of a flora; those in summer have all.
-
-    Those of a dense stand may have more or fewer at all times.
-    """
+def _states_of(flora: Flora, number: int) -> tuple[int, ...]:
+    """Indices of `SHARES` between which plants of a species are on the day of a flora, or in a dense stand."""
     low, high = (1.0, 1.0) if flora.day is None else flora.day.share_range(flora.rows, number)
     shares = np.array(SHARES)
     first = int(np.flatnonzero(shares >= min(high, 1.0) - 1e-9)[-1])
@@ -486,24 +473,12 @@ def needed(flora: Flora, number: int) -> list[tuple[Flora, int]]:
         asked[some, one] = None
         return np.ones((2, int((some.rows["species"] == one).sum()), len(COUNTS)))
 
-    weights_of(flora.in_leaf, number, states_of(flora, number), known)
+    _weights_of(flora.in_leaf, number, _states_of(flora, number), known)
     return list(asked)
 
 
-def weights_of(flora: Flora, number: int, states: tuple[int, ...], known: Known) -> Floats:
-    """Weights (2, s, r, k) of a species of a flora in summer, in some states; 1 in the others.
-
-    Parameters
-    ----------
-    flora : Flora
-        In summer.
-    number : int
-        Index of the species.
-    states : tuple of int
-        Indices of `SHARES`.
-    known : callable
-        What was measured of those that are `needed`.
-    """
+def _weights_of(flora: Flora, number: int, states: tuple[int, ...], known: Known) -> Floats:
+    """Weights (2, s, r, k) of a species of a flora in summer, in some states of `SHARES`; 1 in the others."""
     own, rows = flora.species[number], flora.rows[flora.rows["species"] == number]
     out = np.ones((2, max(states) + 1, len(rows), len(COUNTS)))
     if own.aged is None:
@@ -524,9 +499,8 @@ def weights_of(flora: Flora, number: int, states: tuple[int, ...], known: Known)
         # Leaves that are gone change as much of what hides behind others as when the plant is full-grown.
         all_leaves, some = inverse(full), inverse(with_leaves(full.species[0], SHARES[state]))
         left = np.clip((some - all_leaves) / np.maximum(all_leaves - 1.0, 0.05), -1.0, 0.5)
-        out[:, state] = 1.0 / np.clip(
-            grown + left * np.maximum(grown - 1.0, 0.05), 1.0 / _HIGHEST_WEIGHT, 1.0 / _LOWEST_WEIGHT
-        )
+        less = grown + left * np.maximum(grown - 1.0, 0.05)
+        out[:, state] = 1.0 / np.clip(less, 1.0 / _HIGHEST_WEIGHT, 1.0 / _LOWEST_WEIGHT)
     return out
 
 

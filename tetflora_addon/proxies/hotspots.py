@@ -73,17 +73,11 @@ _OVERLAPS = _overlaps()
 _MEANS = _means()
 
 
-def balance(chord: Floats, extinction: Floats, leaf: Floats, facet: Floats) -> Floats:
+def _balance(chord: Floats, extinction: Floats, leaf: Floats, facet: Floats) -> Floats:
     """Light (n,) that leaves send to the eye once over what facets do, which send as much in all directions.
 
-    Parameters
-    ----------
-    chord : (n,) float64
-        2 sin(ψ / 2) of the angle ψ between light and eye.
-    extinction : (n,) float64
-        1/m.
-    leaf, facet : (n,) float64
-        Roots of the areas, meters. Facets are not smaller than leaves.
+    ``chord`` is 2 sin(ψ / 2) of the angle ψ between light and eye; extinction is in 1/m, and roots of areas, of
+    leaves and of facets that are no smaller, in meters.
     """
     chord = np.maximum(chord, 1e-3)
     small, large = _CHORD * extinction * leaf, _CHORD * extinction * np.maximum(facet, leaf)
@@ -103,7 +97,7 @@ def balanced_colors(color: Floats, hotspot_factor: Floats) -> Floats:
 class LightRatios(Arrays):
     """How light on the facets of sub-plants (n) differs from that on their leaves."""
 
-    hotspot: Floats  # (n,): light that leaves send to the eye once over what facets do, see `balance`
+    hotspot: Floats  # (n,): light that leaves send to the eye once over what facets do, see `_balance`
     toward: Floats = column(3)  # (n, 3): unit vectors to the strongest lamp
     part: Floats  # (n,): its part of the light of all lamps; 0 where there is none
 
@@ -124,18 +118,16 @@ class LightRatios(Arrays):
         return np.clip(balanced_colors(color, self.hotspot[owner]) * (mean * lit**-power)[:, None], 0.0, 1.0)
 
 
-def light_ratios(
-    flora: Flora, subplants: Branches, facet: Floats, camera: Camera, lights: Sequence[Light]
-) -> LightRatios:
+def light_ratios(flora: Flora, plants: Branches, facet: Floats, camera: Camera, lights: Sequence[Light]) -> LightRatios:
     """Those of sub-plants (n) with facets of sides (n,), meters; of hotspots the mean over lamps by their strength.
 
     The sky has no hotspot. Where there are lamps, it is taken for little.
     """
-    place = subplants.position + 0.5 * subplants.length[:, None] * subplants.frame[:, :, 2]
-    radius, low, high = extents(flora, subplants, farthest=False).T
-    volume = _FILLED * np.pi * radius**2 * (high - low) * subplants.length**3
-    extinction = 0.5 * flora.leaf_areas(subplants) / np.maximum(volume, 1e-300)
-    leaf, eye = np.sqrt(flora.one_leaf_area(subplants)), to_eye(camera, place)
+    place = plants.position + 0.5 * plants.length[:, None] * plants.frame[:, :, 2]
+    radius, low, high = extents(flora, plants, farthest=False).T
+    volume = _FILLED * np.pi * radius**2 * (high - low) * plants.length**3
+    extinction = 0.5 * flora.leaf_areas(plants) / np.maximum(volume, 1e-300)
+    leaf, eye = np.sqrt(flora.one_leaf_area(plants)), to_eye(camera, place)
     total, strength, most = (np.zeros(len(place)) for _ in range(3))
     strongest = np.zeros_like(place)
     for light in lights:
@@ -144,7 +136,7 @@ def light_ratios(
             away = np.maximum(np.linalg.norm(light.position - place, axis=1), 1e-9)
             toward = (light.position - place) / away[:, None]
         own = np.broadcast_to(float(np.mean(light.color)) / away**2, len(place))
-        total += own * balance(np.linalg.norm(eye - toward, axis=1), extinction, leaf, facet)
+        total += own * _balance(np.linalg.norm(eye - toward, axis=1), extinction, leaf, facet)
         strength += own
         strongest = np.where((own > most)[:, None], toward, strongest)
         most = np.maximum(most, own)

@@ -73,6 +73,10 @@ class Facets(Arrays):
         return np.cross(self.across, self.along)
 
 
+#: Whole branches, and that (n,) of each piece.
+Bearers = tuple[WholeBranches, Integers]
+
+
 @dataclass(frozen=True)
 class FacetRules(Arrays):
     """How facets of things (n) are made: sub-plants, or pieces of branches."""
@@ -80,8 +84,7 @@ class FacetRules(Arrays):
     leaf: Floats  # (n,): side of a facet for leaves, meters; facets for leaves are never smaller than the leaves
     wood: Floats | None = None  # (n,): the same for wood; None where it is the same
     weight: Floats | None = None  # (n,): fraction of their area that facets get, see `facet_weights`; None for all
-    #: (n,): fraction of each that is drawn as it is; as many of its facets are left out at random. Of pieces that of
-    #: their leaves alone.
+    #: (n,): fraction of each, of pieces that of their leaves, drawn as it is; so many facets are left out at random.
     explicit: Floats | None = None
     lit: LightRatios | None = None  # of n
     thin: Thin | None = None
@@ -127,9 +130,7 @@ def subplant_facets(flora: Flora, subplants: Branches, rules: FacetRules) -> Fac
     return made.take(made.side > 0)
 
 
-def piece_facets(
-    flora: Flora, pieces: Pieces, rules: FacetRules, whole: tuple[WholeBranches, Integers] | None = None
-) -> Facets:
+def piece_facets(flora: Flora, pieces: Pieces, rules: FacetRules, whole: Bearers | None = None) -> Facets:
     """Facets of pieces (n) of branches, by rules of n.
 
     Where whole branches are given, and that (n,) of each piece, their wood is drawn as it is.
@@ -161,9 +162,7 @@ def pushed_outside_view(facets: Facets, distance_to_view: Callable[[NDArray], ND
     return replace(facets, center=center, side=facets.side * fraction).take(np.flatnonzero(fraction > 0.0))
 
 
-def facet_sites(
-    key: Keys, area: Floats, facet: Floats, path: int, draw: int, explicit: Floats | None = None
-) -> FacetSites:
+def facet_sites(key: Keys, area: Floats, facet: Floats, path: int, draw: int, real: Floats | None = None) -> FacetSites:
     """Facets that areas (n,) are cut into, by the area (n,) of one; their expected number is area / facet.
 
     From 1 on they divide the area evenly; below, one stands for several sub-plants. The real fraction (n,) gets none.
@@ -173,9 +172,9 @@ def facet_sites(
     owner, index = spread(counts)
     one = facet * np.where(expected >= 1.0, expected / np.maximum(counts, 1), 1.0)
     every = FacetSites(owner, index, child_key(key[owner], index + path), one[owner])
-    if explicit is None or not explicit.any():
+    if real is None or not real.any():
         return every
-    return every.take(np.flatnonzero(uniform(every.key, Draw.TRANSITION) >= explicit[owner]))
+    return every.take(np.flatnonzero(uniform(every.key, Draw.TRANSITION) >= real[owner]))
 
 
 def _in_a_face(flora: Flora, row: NDArray, key: Keys, frame: NDArray) -> tuple[NDArray, NDArray]:
@@ -273,9 +272,7 @@ def _leaf_facets(
     return Facets(made.center, across, along, side, *look, stretch=stretch, dull=1.0 - left * (1.0 - dull))
 
 
-def _leaves_of_pieces(
-    flora: Flora, pieces: Pieces, rules: FacetRules, whole: tuple[WholeBranches, Integers] | None
-) -> Facets:
+def _leaves_of_pieces(flora: Flora, pieces: Pieces, rules: FacetRules, whole: Bearers | None) -> Facets:
     branches, rows = pieces.branches, flora.rows
     row = branches.row
     size, variation = rows["leaf_size"][row].T
@@ -367,13 +364,11 @@ def _along(
     return made.take(np.flatnonzero((t >= first[owner]) & (t < pieces.t1[owner])))
 
 
-def _leaf_colors(
-    flora: Flora, branches: Branches, made: FacetSites, leaves: Floats, outward: Floats, young: Floats
-) -> Floats:
+def _leaf_colors(flora: Flora, branches: Branches, made: FacetSites, leaves: Floats, *places: Floats) -> Floats:
     """Colors (m, 3) of facets that stand for several leaves (m,) of branches each: a mean varies less than one leaf."""
     several, row = np.sqrt(np.maximum(leaves, 1)), made.row
     deviation = signed(made.key, Draw.LEAF_COLOR) / several
-    mean = mean_leaf_colors(flora.rows, row, outward, young)
+    mean = mean_leaf_colors(flora.rows, row, *places)
     if branches.year is not None:
         summer, mean = mean, flora.day.own_colors(branches, flora.rows["leaf_kind"][row], mean, made.owner)
         day, hue = (gathered(branches.year[:, i], made.owner) for i in range(2))
@@ -454,8 +449,7 @@ def _placed(placed: PlacedAssets, parts: AssetParts, made: FacetSites, leafy: bo
     if len(again):
         for axis, by in ((across, _ASSET_MOVE), (along, _ASSET_MOVE + 1)):
             center[again] += (_ASSET_MOVED * side[again] * signed(key[again], by))[:, None] * axis[again]
-    color, through, rough = (
-        of[pick].astype(np.float64) for of in (samples.color, samples.transmission, samples.roughness)
-    )
+    looks = samples.color, samples.transmission, samples.roughness
+    color, through, rough = (of[pick].astype(np.float64) for of in looks)
     look = recollision_albedo(color, weight), through
     return Facets(center, across, along, side, *look, roughness=rough, dull=1.0 - np.clip(weight, 0.0, 1.0))

@@ -266,19 +266,11 @@ Slack = Callable[[Floats], Floats]
 DESCEND_BATCH = 200_000
 
 
-def cut(polygons: Polygons, planes: Floats, slack: Floats | float = 0.0) -> tuple[Integers, Integers, Polygons]:
-    """Clip polygons (n,) by a plane (n, 4) each.
+def _cut(polygons: Polygons, planes: Floats, slack: Floats | float = 0.0) -> tuple[Integers, Integers, Polygons]:
+    """Clip polygons (n,) by a plane (n, 4) each: owners, sides (0 where the distance is negative, else 1), fragments.
 
-    Triangles that reach beyond their plane by no more than ``slack`` (n,), in meters, stay whole.
-
-    Returns
-    -------
-    owner : (k,) int64
-        Polygon that each fragment comes from.
-    side : (k,) int64
-        0 where the distance is negative, 1 elsewhere.
-    fragments : Polygons of k
-        A triangle that crosses leaves one fragment on one side and two on the other.
+    Triangles that reach beyond their plane by no more than ``slack`` (n,), in meters, stay whole. One that crosses
+    leaves one fragment on one side and two on the other.
     """
     owner, whole = polygons.as_fragments()
     distance = whole.corner_distances(planes[owner])
@@ -324,7 +316,7 @@ def sort_into_children(tree: TetrahedralTree, held: InCells[Polygons], slack: Sl
             cells[some], crosses[some] = _lowered(tree, polygons.take(some), cells[some], slack)
         placed.append(replace(held, cell=cells).take(~crosses))
         polygons, cells, width = polygons.take(crosses), cells[crosses], held.totals.width[crosses]
-        owner, side, polygons = cut(polygons, tree.planes(cells), slack(polygons.center))
+        owner, side, polygons = _cut(polygons, tree.planes(cells), slack(polygons.center))
         held = InCells(polygons, tree.children[cells[owner], side], polygon_totals(polygons, width[owner]))
     return InCells.concatenate(placed)
 

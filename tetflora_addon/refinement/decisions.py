@@ -9,7 +9,7 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import Arrays, Floats, Integers, Mask, smoothstep
+from ..arrays import Arrays, Floats, Integers, Mask, column, nested, smoothstep
 from ..camera.camera import Camera
 from ..tetrahedra.geometry import squared_edges, volume
 from ..tetrahedra.tree import TetrahedralTree
@@ -51,8 +51,8 @@ class Decision(IntEnum):
 class Terminals(Arrays):
     """Terminal tetrahedra that hold something, and what is known of each until it is divided."""
 
-    nodes: Integers  # (n,): their nodes in the tree
-    totals: Totals  # of n
+    nodes: Integers = column(dtype=np.int64)  # (n,): their nodes in the tree
+    totals: Totals = nested(Totals)  # of n
     #: pixels and opacity, (n,): as in `visibility.Outline`.
     pixels: Floats
     opacity: Floats
@@ -60,7 +60,7 @@ class Terminals(Arrays):
     min_feature_px: Floats  # (n,): the same where it is farthest away
     longest_edge_px: Floats  # (n,): longest edge in pixels at their distance
     #: (n,): whether all of each is in view. What crosses the border has the pixels of its visible part only.
-    fully_inside: Mask
+    fully_inside: Mask = column(dtype=bool)
 
     @classmethod
     def seen(cls, tree: TetrahedralTree, nodes: Integers, totals: Totals, camera: Camera, buffer: AlphaBuffer) -> Self:

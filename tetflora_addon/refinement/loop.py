@@ -82,8 +82,7 @@ class Statistics:
     instances: int = 0
     instances_whole: int = 0
     instances_clusters: int = 0
-    #: tetrahedra_made, tetrahedra_terminal and tetrahedra_proxy: all tetrahedra ever made; those that are not divided;
-    #: those of them that are drawn as proxies.
+    #: tetrahedra_made, _terminal and _proxy: all that were ever made; those that are not divided; of these, proxies.
     tetrahedra_made: int = 0
     tetrahedra_terminal: int = 0
     tetrahedra_proxy: int = 0
@@ -341,7 +340,8 @@ def refine(
     buffers = Buffers(camera, settings.visibility_resolution, occluders)
     # Generations count from the root's own pieces. Passes do not count: a late one may divide what is still coarse.
     deepest = tree.levels - 1 + settings.max_levels
-    cells, buffer = _drawn(tree, buffers, None, None, *_filled(tree, shared, cell_polygons, np.ones(len(tree), bool)))
+    every = _filled(tree, shared, cell_polygons, np.ones(len(tree), bool))
+    cells, buffer = _drawn(tree, buffers, None, Terminals.empty(), *every)
     clock.lap("visibility")
     passes = 0
     while True:
@@ -401,8 +401,8 @@ def refine(
 def _bounds(flora: Flora, plants: SharedPlants, assets: SharedAssets, polygons: Polygons) -> Floats:
     """Axis-aligned box (2, 3) of all that is there, meters."""
     boxes = [bounding_box(flora, plants.parts.branches)] if len(plants.parts) else []
-    boxes += [assets.parts.bounding_box()] if len(assets.parts) else []
-    boxes += [polygons.bounding_box()] if len(polygons) else []
+    for own in filter(len, (assets.parts, polygons)):
+        boxes.append(((own.center.T - own.reach).min(axis=1), (own.center.T + own.reach).max(axis=1)))
     return np.stack([np.min([low for low, _ in boxes], axis=0), np.max([high for _, high in boxes], axis=0)])
 
 
@@ -417,31 +417,20 @@ def _filled(
 
 
 def _drawn(
-    tree: TetrahedralTree,
-    buffers: Buffers,
-    buffer: AlphaBuffer | None,
-    cells: Terminals | None,
-    nodes: Integers,
-    totals: Totals,
+    tree: TetrahedralTree, buffers: Buffers, old: AlphaBuffer | None, cells: Terminals, nodes: Integers, totals: Totals
 ) -> tuple[Terminals, AlphaBuffer]:
     """Terminals that are there and new ones, and the buffer into which all of them are drawn."""
-    old = 0 if cells is None else len(cells)
-    finer = buffers.fit(buffer, old + len(nodes))
-    if old and finer is not buffer:
-        nodes = np.concatenate([cells.nodes, nodes])
-        totals, cells = Totals.concatenate([cells.totals, totals]), None
-    new = Terminals.seen(tree, nodes, totals, buffers.camera, finer)
-    return (Terminals.concatenate([cells, new]) if cells is not None else new), finer
+    buffer = buffers.fit(old, len(cells) + len(nodes))
+    if buffer is not old:
+        nodes, totals = np.concatenate([cells.nodes, nodes]), Totals.concatenate([cells.totals, totals])
+        cells = Terminals.empty()
+    return Terminals.concatenate([cells, Terminals.seen(tree, nodes, totals, buffers.camera, buffer)]), buffer
 
 
 def _slack(camera: Camera, resolution: int) -> Slack:
     """A pixel of the alpha buffer, in meters: nothing smaller changes decisions."""
     pixels = max(pixels_of_buffer(camera, resolution), SLACK)
-
-    def slack(points: Floats) -> Floats:
-        return pixels * camera.extent_around(points)
-
-    return slack
+    return lambda points: pixels * camera.extent_around(points)
 
 
 def _on_day(settings: RefinementSettings, flora: Flora, plants: Branches) -> RefinementSettings:

@@ -8,7 +8,7 @@ triangles of its face. Positions, texture coordinates and all other attributes o
 fragments of a face add up to it whatever the sequence of cuts.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from copy import copy
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -85,39 +85,27 @@ class Meshes:
         self.linear = np.ascontiguousarray(matrices[:, :3, :3].transpose(0, 2, 1))
         self.origin = matrices[:, :3, 3].copy()
         rows = self.linear
-        self.cofactors = np.stack(
-            [np.cross(rows[:, 1], rows[:, 2]), np.cross(rows[:, 2], rows[:, 0]), np.cross(rows[:, 0], rows[:, 1])], 1
-        )
+        self.cofactors = np.cross(np.roll(rows, -1, axis=1), np.roll(rows, -2, axis=1))
         self.mirrored = np.linalg.det(rows) < 0
         self.largest = np.linalg.norm(rows, ord=2, axis=(1, 2)) if len(rows) else np.zeros(0)
         self.mean_scale = np.linalg.norm(rows, axis=2).mean(axis=1)
-
-        def starts(sizes: list[int]) -> Integers:
-            return np.cumsum([0, *sizes])
-
-        def joined(arrays: list[NDArray], empty: NDArray) -> NDArray:
-            return np.concatenate([empty, *arrays])
-
-        self.first_vertex = starts([len(s.positions) for s in surfaces])
-        self.first_corner = starts([len(s.corner_verts) for s in surfaces])
-        self.first_face = starts([len(s.material) for s in surfaces])
-        self.first_slot = starts([len(s.colors) for s in surfaces])
-        every = list(enumerate(surfaces))
-        none, flat = np.zeros(0, np.int64), np.zeros((0, 3))
-        self.positions = joined([s.positions for s in surfaces], flat)
-        self.corner_verts = joined([s.corner_verts + self.first_vertex[i] for i, s in every], none)
-        self.face_start = joined([s.face_offsets[:-1] + self.first_corner[i] for i, s in every], none)
-        self.face_size = joined([np.diff(s.face_offsets) for s in surfaces], none)
-        self.triangles = joined([s.triangles + self.first_corner[i] for i, s in every], np.zeros((0, 3), np.int64))
+        sizes = [[len(own) for own in (s.positions, s.corner_verts, s.material, s.colors)] for s in surfaces]
+        starts = np.cumsum([[0] * 4, *sizes], axis=0).T
+        self.first_vertex, self.first_corner, self.first_face, self.first_slot = starts
+        every, none = list(zip(surfaces, *starts[:, :-1], strict=True)), np.zeros(0, np.int64)
+        self.corner_verts = np.concatenate([none, *(s.corner_verts + vertex for s, vertex, *_ in every)])
+        self.face_start = np.concatenate([none, *(s.face_offsets[:-1] + corner for s, _, corner, *_ in every)])
+        self.face_size = np.concatenate([none, *(np.diff(s.face_offsets) for s in surfaces)])
+        self.triangles = np.concatenate([none.reshape(0, 3), *(s.triangles + corner for s, _, corner, *_ in every)])
         self.face_triangle = np.cumsum(self.face_size - 2) - (self.face_size - 2)
-        self.slot = joined([s.material + self.first_slot[i] for i, s in every], none)
-        self.colors = joined([s.colors for s in surfaces], flat)
-        self.transmission, self.coverage, self.width = (
-            joined([getattr(s, name) for s in surfaces], np.zeros(0)) for name in ("transmission", "coverage", "width")
-        )
-        self.solid, self.leaf = (
-            joined([getattr(s, k) for s in surfaces], np.zeros(0, bool)) for k in ("solid", "leaf")
-        )
+        self.slot = np.concatenate([none, *(s.material + slot for s, *_, slot in every)])
+
+        def joined(empty: NDArray, *names: str) -> Iterator[NDArray]:
+            return (np.concatenate([empty, *(getattr(s, name) for s in surfaces)]) for name in names)
+
+        self.positions, self.colors = joined(np.zeros((0, 3)), "positions", "colors")
+        self.transmission, self.coverage, self.width = joined(np.zeros(0), "transmission", "coverage", "width")
+        self.solid, self.leaf = joined(np.zeros(0, bool), "solid", "leaf")
 
     def counted_from(self, origin: Floats) -> Self:
         """The same in coordinates that begin at a place (3,) of the present ones."""
@@ -136,8 +124,6 @@ class Meshes:
     @cached_property
     def centers(self) -> Floats:
         """Centers (f, 3) of the boxes around faces."""
-        if not len(self.face_start):
-            return np.zeros((0, 3))
         points = self.positions[self.corner_verts]
         low = np.minimum.reduceat(points, self.face_start, axis=0)
         return (low + np.maximum.reduceat(points, self.face_start, axis=0)) / 2
@@ -145,8 +131,6 @@ class Meshes:
     @cached_property
     def radii(self) -> Floats:
         """Radii (f,) of the spheres about these centers that hold the faces."""
-        if not len(self.face_start):
-            return np.zeros(0)
         points = self.positions[self.corner_verts]
         away = np.linalg.norm(points - np.repeat(self.centers, self.face_size, axis=0), axis=1)
         return np.maximum.reduceat(away, self.face_start)
@@ -284,10 +268,6 @@ class Polygons(Arrays):
             own = np.linalg.norm(self.meshes.vectors(triangle, some.instance[owner]), axis=1)
             areas[run] = np.bincount(owner, fraction * own, len(some))
         return areas
-
-    def bounding_box(self) -> Floats:
-        """Axis-aligned box (2, 3) around all of them, at least one, meters."""
-        return np.stack([(self.center.T - self.reach).min(axis=1), (self.center.T + self.reach).max(axis=1)])
 
     def distances(self, planes: Floats) -> tuple[Floats, Floats]:
         """Least and greatest signed distances (n,) of the corners from planes (n, 4), meters."""

@@ -83,13 +83,10 @@ def tetrahedron_fragments(vertices: Floats, camera: Camera, width: int, height: 
     A tetrahedron of few pixels (`SMALL`) has its silhouette's area as coverage, divided among its fragments, and its
     mean chord V / A as thickness: Σ coverage · thickness over all pixels is its volume, per area of a pixel.
     """
-
-    def drawn(block: slice) -> Fragments:
-        part = _fragments(vertices[block], camera, width, height)
-        return replace(part, cell=part.cell + np.int32(block.start))
-
     # One after another: threads, and other processes, took as long for the many small steps of this.
-    return Fragments.concatenate([drawn(block) for block in blocks(len(vertices), TETRAHEDRON_BATCH)])
+    some = blocks(len(vertices), TETRAHEDRON_BATCH)
+    made = [(block.start, _fragments(vertices[block], camera, width, height)) for block in some]
+    return Fragments.concatenate([replace(part, cell=part.cell + np.int32(start)) for start, part in made])
 
 
 def occluder_depth(triangles: Floats, camera: Camera, width: int, height: int) -> Floats:
@@ -190,12 +187,7 @@ def _rows(box: Integers, which: Integers) -> Iterator[_Rows]:
 
 
 def _with_small_ones(
-    vertices: Floats,
-    local: Floats,
-    camera: Camera,
-    size: tuple[int, int],
-    bounds: tuple[Floats, Floats, Floats],
-    found: Fragments,
+    vertices: Floats, local: Floats, camera: Camera, size: tuple[int, int], bounds: Sequence[Floats], found: Fragments
 ) -> Fragments:
     """Add fragments for tetrahedra between the pixels' centers, and set the coverage of all."""
     (width, height), (low, high, middle) = size, bounds

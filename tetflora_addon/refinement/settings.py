@@ -30,8 +30,7 @@ class RefinementSettings:
     #: Leaves narrower than so many pixels become facets; up to 2.5 times this width, a growing fraction stays real.
     #: About half of ``facet``: below that, leaves cost more polygons than facets.
     leaf_limit: float = script_setting(0.6, min=0.05, max=1000.0)
-    #: Visible tetrahedra larger than so many pixels are always split, even where all their contents become polygons, to
-    #: find hidden parts.
+    #: Visible tetrahedra larger than so many pixels are always split, even if all become polygons: parts may hide.
     block: float = script_setting(32.0, min=1.0, max=10_000.0)
     few_polygons: int = script_setting(200, min=0)  # tetrahedra holding fewer polygons are not split further
     #: Visibility below which a tetrahedron counts as hidden. Larger values save polygons in thickets.
@@ -41,8 +40,7 @@ class RefinementSettings:
     hidden_block: float = math.inf
     #: The same for proxies that are seen; infinite for facets, which need no finer tetrahedra than their visibility.
     proxy_block: float = math.inf
-    #: Fraction of the image's width and height by which the view is widened on each side: leaves that grow outside but
-    #: reach in are real leaves.
+    #: Fraction of the image by which the view is widened on each side: leaves that reach in from outside are real.
     margin: float = 0.04
     #: Longer side of the buffer that says what is hidden, pixels; at most the image's or 256. Time grows by its square.
     visibility_resolution: int = script_setting(256, min=16, max=4096)

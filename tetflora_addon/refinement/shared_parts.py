@@ -19,7 +19,7 @@ from typing import Any, Generic, Self, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import Arrays, Chunks, Floats, Floats32, Growing, Integers, Integers32, Mask, column, nested, spread
+from ..arrays import Arrays, Chunks, Floats, Floats32, Growing, Integers, Integers32, Keys, Mask, column, nested, spread
 from ..assets.asset import AssetTable, Instances
 from ..camera.camera import Camera
 from ..compiled.flora import Flora, placed_samples
@@ -61,11 +61,8 @@ class SharePoints(Arrays):
         return self.leaf + self.wood / 2
 
 
-def descend(tree: TetrahedralTree, points: SharePoints, some: Integers | None = None) -> Integers32:
-    """Terminal nodes (m,) that points are in, below those that they are known to be in.
-
-    some: indices (k,) of points, by default all, of which alone they are wanted (k,).
-    """
+def _descend(tree: TetrahedralTree, points: SharePoints, some: Integers | None = None) -> Integers32:
+    """Terminal nodes (m,) that points, or only some (k,) of them, are in below those that they are known to be in."""
     cell, children = points.cell if some is None else points.cell[some], tree.children.reshape(-1)
     every = np.flatnonzero(np.take(children, 2 * cell) >= 0)
     cell = cell.copy()
@@ -181,7 +178,7 @@ class SharedParts(Generic[Parts]):
         part = np.take(points.part, inside)
         large = np.take(self._figures.rows.reach, part) > LARGE * np.take(edge, np.take(points.cell, inside))
         # Handed on in place: millions of points that stay where they are are not looked at.
-        points.cell[inside] = cell = descend(tree, points, inside)
+        points.cell[inside] = cell = _descend(tree, points, inside)
         changed[cell] = True
         if large.any():
             opening = np.zeros(len(self._parts), bool)
@@ -200,7 +197,7 @@ class SharedParts(Generic[Parts]):
             count += len(new)
         new_parts, new_points = self._parts.kind.concatenate(parts), SharePoints.concatenate(points)
         if tree is not None:
-            new_points = replace(new_points, cell=descend(tree, new_points))
+            new_points = replace(new_points, cell=_descend(tree, new_points))
         left = np.take(self._points.rows.cell, gone)
         self._points.exchange(gone, new_points)
         self._parts.append(new_parts)
@@ -256,7 +253,7 @@ OPEN_BATCH = 40_000
 _START, _ASSET_START = 221, 251
 
 
-def share_points(
+def _share_points(
     flora: Flora,
     parts: PlantParts,
     pixels: Floats,
@@ -265,21 +262,10 @@ def share_points(
     along: Integers | int = 0,
     room: int = MOST_BEYOND,
 ) -> SharePoints:
-    """Points on parts of plants, all in the root.
+    """Points on sub-plants that so many pixels (n,) show, or with ``lines`` on branches alone; all in the root.
 
-    Parameters
-    ----------
-    parts : PlantParts of n
-        Sub-plants, or if ``lines`` are given branches alone.
-    pixels : (n,) float64
-        Extent of the parts in the image.
-    lines : Axes of n, optional
-    times : int
-        How many times as many points as usual.
-    along : (n,) int64, optional
-        Points on the wood of branches alone at least.
-    room : int, optional
-        Points on leaves that all of them have at most, beyond the fewest.
+    They are so many times as many as usual, on wood of branches alone at least as many as ``along`` (n,), and on leaves
+    of all at most as many as there is ``room`` for beyond the fewest.
     """
     solid = are_solids(flora.rows)[parts.branches.row]
     squares = np.clip((pixels / PIXELS_IN_SOLID) ** 2, FEWEST_IN_SOLID, MOST_IN_SOLID)
@@ -299,7 +285,7 @@ def share_points(
         if lines is not None:
             t = (index + 0.5) / count[owner]
             if leafy:
-                position = _along_leaves(flora, parts.branches, lines, owner, index, t)
+                position = _on_leaves(flora, parts.branches, lines, owner, index, t)
             else:  # thicker parts have more of the wood
                 thick = radius_at(flora.rows, parts.branches.take(owner), t)
                 mean = np.bincount(owner, thick, len(parts)) / np.maximum(count, 1)
@@ -312,16 +298,14 @@ def share_points(
             some = np.flatnonzero(solid[owner])
             if leafy and len(some):  # more places than samples
                 given = owner[some], index[some], (index[some] + 0.5) / count[owner[some]]
-                position[some] = _along_leaves(flora, parts.branches, axes(flora.rows, parts.branches), *given)
+                position[some] = _on_leaves(flora, parts.branches, axes(flora.rows, parts.branches), *given)
         none = np.zeros(len(owner), np.float32)
         areas = (even.astype(np.float32), none) if leafy else (none, even.astype(np.float32))
         made.append(SharePoints(owner.astype(np.int32), none.astype(np.int32), position.astype(np.float32), *areas))
     return SharePoints.concatenate(made)
 
 
-def _along_leaves(
-    flora: Flora, branches: Branches, lines: Axes, owner: Integers, index: Integers, part: Floats
-) -> Floats:
+def _on_leaves(flora: Flora, branches: Branches, lines: Axes, owner: Integers, index: Integers, part: Floats) -> Floats:
     """Places (m, 3) of leaves on branches, after parts (m,) of them; ``index`` (m,) numbers those of a branch."""
     start = leaf_start(flora.rows, branches)[owner]
     t, key = start + (1.0 - start) * part, leaf_keys(branches, owner, index)
@@ -411,7 +395,7 @@ class SharedPlants(SharedParts[PlantParts]):
         if lines is not None:
             along = parts.branches.length / np.maximum(2.0 * APART * parts.branches.radius, 1e-300)
             along = np.where(self.thick(parts), np.minimum(along, MOST_ALONG), 0.0).astype(np.int64)
-        made = share_points(self.flora, parts, self.pixels(parts), lines, self._times, along, self._room)
+        made = _share_points(self.flora, parts, self.pixels(parts), lines, self._times, along, self._room)
         self._room -= min(self._room, max(len(made) - self._times * FEWEST * len(parts), 0))
         return made
 
@@ -441,11 +425,6 @@ class AssetParts(Arrays):
     def reach(self) -> Floats:
         """Distance (n,) from the middle within which all of each is, meters."""
         return 0.5 * np.sqrt(3.0) * self.extent
-
-    def bounding_box(self) -> Floats:
-        """Axis-aligned box (2, 3) around all of them, at least one, meters."""
-        reach = self.reach[:, None]
-        return np.stack([(self.center - reach).min(axis=0), (self.center + reach).max(axis=0)])
 
 
 class PlacedAssets:
@@ -519,12 +498,11 @@ class PlacedAssets:
         some = np.flatnonzero(self.stretched[instance])
         if len(some):
             own, of = cluster[some], instance[some]
-            owner, index = spread((clusters.leaf_samples + clusters.wood_samples)[own].astype(np.int64))
+            number = (clusters.leaf_samples + clusters.wood_samples)[own].astype(np.int64)
+            owner, index = spread(number)
             normal = self.assets.samples.normal[clusters.leaf_sample[own][owner] + index].astype(np.float64)
             turned = np.einsum("nij,nj->ni", self.cofactors(of[owner]), normal)
-            longer = np.bincount(owner, np.linalg.norm(turned, axis=1), len(own)) / np.bincount(
-                owner, minlength=len(own)
-            )
+            longer = np.bincount(owner, np.linalg.norm(turned, axis=1), len(own)) / number
             leaf[some] *= longer / scale[some]
             wood[some] *= longer / scale[some]
         return leaf, wood
@@ -535,14 +513,12 @@ class PlacedAssets:
         part = clusters.closed_leaf_area[parts.cluster] / np.maximum(clusters.wood_area[parts.cluster], 1e-300)
         return parts.totals.wood_area * part
 
-    def keys(self, parts: AssetParts) -> NDArray[np.uint64]:
+    def keys(self, parts: AssetParts) -> Keys:
         """A key (n,) for each part, which tells it apart from all others of all instances."""
         local = parts.cluster - self.assets.root[self.instances.asset[parts.instance]]
         return child_key(self.instances.key[parts.instance], local)
 
-    def picked(
-        self, parts: AssetParts, key: NDArray[np.uint64], leafy: bool, owner: Integers, index: NDArray
-    ) -> Integers:
+    def picked(self, parts: AssetParts, key: Keys, leafy: bool, owner: Integers, index: NDArray) -> Integers:
         """Samples (m,) of parts (n,) with keys (n,): a run on leaves, or on wood, that begins anywhere."""
         clusters = self.assets.clusters
         first = (clusters.leaf_sample if leafy else clusters.wood_sample)[parts.cluster].astype(np.int64)

@@ -29,8 +29,7 @@ class Summaries:
     color: Floats  # (n, 3): linear RGB
     transmission: Floats  # (n,): fraction of scattered light that goes through
     moment: Floats  # (n, 3, 3): mean of n nᵀ; its trace is 1 where there is anything
-    #: (n, 2): determines the factor on their extinction, see `compiled.clumping.factors`; the factor is 1 where not
-    #: given, and for what polygons contribute.
+    #: (n, 2): determines the factor on extinction, see `compiled.clumping.factors`; 1 if not given, and of polygons.
     clumping: Floats | None = None
 
     def effective_area(self, volumes: Floats) -> Floats:
@@ -53,8 +52,6 @@ def summarize(
     ----------
     index : (nodes,) int
         Number of the summary that each node of the tree contributes to; contents of nodes with −1 are skipped.
-    count : int
-        Number of summaries.
     assets : PlacedAssets, Held of AssetParts, optional
         Clusters of instances, from `SharedAssets.held`.
     """
@@ -116,9 +113,8 @@ def _add_polygons(sums: Floats, contents: Contents, index: Integers) -> None:
         optical = (area * fraction * meshes.coverage[slot] * np.where(solid, 0.5, 1.0))[:, None]
         moment = (normal[:, :, None] * normal[:, None, :]).reshape(-1, 9)
         even = np.broadcast_to([1.0, 0.0], (len(face), 2))
-        seen = np.concatenate(
-            [np.ones_like(optical), meshes.colors[slot], meshes.transmission[slot][:, None], moment, even], axis=1
-        )
+        look = meshes.colors[slot], meshes.transmission[slot][:, None]
+        seen = np.concatenate([np.ones_like(optical), *look, moment, even], axis=1)
         _add(sums, index[contents.polygons.cell[some]][owner], optical * seen)
 
 

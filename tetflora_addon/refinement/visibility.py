@@ -70,16 +70,6 @@ class AlphaBuffer:
         Where each pixel's ray ends at an opaque polygon, as `occluder_depth` gives it for the same size.
     pixel_weight : (height · width,) float64, optional
         Pixels of the final image that each pixel stands for, where the image is not the camera's own.
-
-    Attributes
-    ----------
-    width, height : int
-        Size of the buffer, pixels.
-
-    Raises
-    ------
-    ValueError
-        If the occluders were drawn for a buffer of another size.
     """
 
     def __init__(
@@ -199,13 +189,13 @@ class Buffers:
         if not self.around and occluders is not None and len(occluders):
             self.depth = occluder_depth(occluders, hiding(camera), *self.size)
 
-    def fit(self, buffer: "AlphaBuffer | PanoramaBuffer | None", cells: int) -> "AlphaBuffer | PanoramaBuffer":
+    def fit(self, buffer: "AlphaBuffer | _PanoramaBuffer | None", cells: int) -> "AlphaBuffer | _PanoramaBuffer":
         """The buffer itself if it is fine enough for a number of tetrahedra, or a finer one that is empty."""
         wanted = fitting(cells // 2 if self.around else cells, self.finest)
         if buffer is not None and max(buffer.width, buffer.height) >= wanted:
             return buffer
         if self.around:
-            return PanoramaBuffer(self.camera, wanted, self.occluders)
+            return _PanoramaBuffer(self.camera, wanted, self.occluders)
         return AlphaBuffer(self.camera, wanted, None if self.depth is None else self._reduced(wanted))
 
     def _reduced(self, resolution: int) -> Floats:
@@ -216,8 +206,7 @@ class Buffers:
         return self.depth.reshape(height, width)[np.ix_(row, column)].ravel()
 
 
-#: Side of a face for the longer side of a buffer. A face spans a quarter of the way round; in its corners its pixels
-#: are several times as dense as in the middle.
+#: Side of a face, a quarter of the way round, for the longer side of a buffer; in its corners pixels are denser.
 FACE_FRACTION = 0.5
 
 #: Directions and upward directions of the six faces in camera space (x right, y up, z back).
@@ -248,18 +237,8 @@ def pixels_per_solid_angle(camera: Camera, directions: Floats) -> Floats:
     return np.where(seen, 1.0 / (camera.pixel_size**2 * np.maximum(np.cos(latitude), LEAST_COSINE)), 0.0)
 
 
-class PanoramaBuffer:
-    """The fragments of all tetrahedra around the eye; to be used as an `AlphaBuffer`.
-
-    Parameters
-    ----------
-    camera : Camera
-        A panorama.
-    side : int
-        Of each of the six faces, pixels.
-    occluders : (t, 3, 3) float64, optional
-        Opaque triangles, meters.
-    """
+class _PanoramaBuffer:
+    """The fragments of all tetrahedra around the eye, in six faces; to be used as an `AlphaBuffer`."""
 
     def __init__(self, camera: Camera, side: int, occluders: Floats | None = None) -> None:
         self.camera = camera

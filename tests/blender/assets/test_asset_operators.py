@@ -88,11 +88,7 @@ def test_operators_take_collections_by_name_and_many_objects():
     scene().collection.objects.link(lamp)
     select(crown("two"), crown("three"), lamp)
     assert bpy.ops.tetflora.use_as_species() == {'FINISHED'}
-    assert sorted(info.name for i, info in edits.catalog().items() if i in asset_species()) == [
-        "held",
-        "three",
-        "two",
-    ]
+    assert sorted(info.name for i, info in edits.catalog().items() if i in asset_species()) == ["held", "three", "two"]
     select(bpy.data.objects["two"], bpy.data.objects["three"])
     assert bpy.ops.tetflora.use_as_species(stop=True) == {'FINISHED'}
     assert bpy.ops.tetflora.use_as_species(stop=True, collection="held") == {'FINISHED'}

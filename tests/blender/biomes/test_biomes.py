@@ -85,7 +85,7 @@ def scene():
 
 
 def small(**changes) -> files.Biome:
-    return files.checked(copy.deepcopy({**SMALL, **changes}), "small")
+    return files._checked(copy.deepcopy({**SMALL, **changes}), "small")
 
 
 def biomes():
@@ -495,7 +495,7 @@ def test_the_mask_of_a_biome_itself_is_saved_and_found_again():
     for obj in (land, hill):
         obj.data.uv_layers.new(name="Map")
     land.vertex_groups.new(name="meadow").add(range(2), 1.0, 'REPLACE')
-    add(files.checked(SMALL, "small"), land)
+    add(files._checked(SMALL, "small"), land)
     biome = biomes()[0]
     biome.vertex_group, biome.invert_group, biome.image = "meadow", True, image
     scene().tetflora.layers_index = 0
@@ -505,7 +505,7 @@ def test_the_mask_of_a_biome_itself_is_saved_and_found_again():
         add(read, grounds)
         assert (biomes()[-1].vertex_group, biomes()[-1].image) == (group, image)
     with pytest.raises(ValueError, match='"mask" has an unknown key'):
-        files.checked(SMALL | {"mask": {"slope": 1.0}}, "small")
+        files._checked(SMALL | {"mask": {"slope": 1.0}}, "small")
 
 
 @pytest.mark.parametrize("which", ['ACTIVE', 'DUE'])

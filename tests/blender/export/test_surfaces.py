@@ -14,7 +14,7 @@ from PIL import Image
 
 from tests.blender.scenes import add_mesh
 from tetflora_addon.blender.attributes import image_pixels, linear_rgb
-from tetflora_addon.blender.export.surfaces import baked, with_surfaces
+from tetflora_addon.blender.export.surfaces import _baked, with_surfaces
 from tetflora_addon.blender.materials.nodes import Graph, surface_material, untag
 from tetflora_addon.blender.results.leaf_objects import materials_of
 from tetflora_addon.blender.species.edits import species_for
@@ -147,6 +147,6 @@ def test_relief_is_as_deep_in_any_part_of_a_leaf(blender):
     slopes = []
     for width in (1.0, 0.25):
         given = np.zeros(2), np.array([width, 1.0]), 0.05
-        found = 2.0 * baked(material, np.full(3, 0.2), 0.4, 64, *given)["normal"] - 1.0
+        found = 2.0 * _baked(material, np.full(3, 0.2), 0.4, 64, *given)["normal"] - 1.0
         slopes.append(np.median(np.abs((found[..., 0] / found[..., 2])[:, : round(16 / width)])))
     assert slopes[1] == pytest.approx(slopes[0], rel=0.2)

@@ -24,7 +24,7 @@ from tetflora_addon.blender.geodata import terrain, trees
 from tetflora_addon.blender.geodata.origin import KEY, Import, importing, origin_of
 from tetflora_addon.blender.geodata.terrain import read_raster
 from tetflora_addon.blender.geodata.trees import curves_of
-from tetflora_addon.blender.placing.terrain import lines_of, read_ground
+from tetflora_addon.blender.placing.terrain import _lines_of, read_ground
 from tetflora_addon.blender.runtime import GoneError
 from tetflora_addon.blender.species.edits import species_for
 from tetflora_addon.errors import SceneError
@@ -161,7 +161,7 @@ def test_terrain_trees_and_outlines_align(tmp_path):
     _call("import_outlines", path)
     woods, roads = bpy.data.collections["Woods"], bpy.data.collections["Roads"]
     assert [o.dimensions.z > 6.0 for o in bpy.data.collections["Buildings"].objects] == [True]
-    (road,) = lines_of(roads.objects[0], depsgraph())
+    (road,) = _lines_of(roads.objects[0], depsgraph())
     assert road.half_width == pytest.approx(1.5)
     assert np.ptp(road.points[:, 0]) == pytest.approx(60.0, abs=0.01)
     ground_in = read_ground([ground], depsgraph(), areas=woods, paths=roads)

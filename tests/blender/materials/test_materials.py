@@ -182,9 +182,9 @@ def knots():
     """A material that shines with 1 in the eyes of large knots, with .25 where ridges give way to them."""
 
     def build(graph, _material):
-        place = graph.outputs("ShaderNodeGroup", node_tree=bark.place_group())["Place"]
+        place = graph.outputs("ShaderNodeGroup", node_tree=bark._place_group())["Place"]
         where = bark.Place(place, None, None, None, None, None, None)
-        eye = bark.knot(graph, where, 0.8, graph.xyz(0.5, 0.5, 0.5))
+        eye = bark._knot(graph, where, 0.8, graph.xyz(0.5, 0.5, 0.5))
         seen = bark.lips(graph, eye)[1] + graph.vector('LENGTH', bark.aside(graph, eye, 1.0)) * 0.25
         graph.node("ShaderNodeOutputMaterial", {"Surface": graph.node("ShaderNodeEmission", {"Color": seen})})
 

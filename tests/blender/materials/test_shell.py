@@ -45,7 +45,7 @@ def place(
         np.tile(normal, (count, 1)),
         np.full(count, plane),
     )
-    buffers = shells.shell_buffers(cells)
+    buffers = shells._shell_buffers(cells)
     material = microsphere.shell_material()
     group = next(n for n in material.node_tree.nodes if n.bl_idname == "ShaderNodeGroup")
     for name, value in {"Stochastic": stochastic, "s": 0.0, "Variation": 0.0, "Roundness": 0.0, **sockets}.items():
@@ -243,7 +243,7 @@ def baked(path, light, extinction):
         np.zeros((count, 3)),
         np.zeros(count),
     )
-    buffers = shells.shell_buffers(cells, np.arange(count)[::-1], np.repeat(light[..., None], 3, axis=2))
+    buffers = shells._shell_buffers(cells, np.arange(count)[::-1], np.repeat(light[..., None], 3, axis=2))
     material = microsphere.baked_shell_material()
     mesh = meshes.write_mesh("shells", buffers, [material])
     bpy.context.scene.collection.objects.link(bpy.data.objects.new("shells", mesh))

@@ -177,6 +177,17 @@ def test_a_field_that_was_moved_gets_plants_where_the_brush_is():
     assert bpy.data.objects["Painted plants"] == field
 
 
+def test_a_field_without_any_point_gets_plants_where_the_brush_is():
+    add_mesh("ground", size=30.0)
+    _brush(store='FIELD')
+    _stroke()
+    field = _field()
+    field.data = bpy.data.meshes.new("never had a point")  # nor an attribute for their places
+    _stroke(places=[(9.0, 3.0, 0.0)])
+    places = _places(_field())
+    assert len(places) and (np.abs(places - [9.0, 3.0, 0.0]).max(axis=0) < [5.1, 5.1, 0.01]).all()
+
+
 def test_a_linked_duplicate_keeps_its_plants():
     add_mesh("ground", size=30.0)
     _brush(store='FIELD')

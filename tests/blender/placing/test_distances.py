@@ -116,22 +116,22 @@ def test_the_brush_follows_what_it_paints():
     painted, settings = scene.tetflora.brush, scene.tetflora.populate
     painted.density = 0.5
     painted.source, painted.species = 'ONE', "birch"
-    birch = brush.brush_of(scene)[0].min_distance
+    birch = brush._brush_of(scene)[0].min_distance
     assert birch > 3.0
     painted.species = "grass"
-    assert brush.brush_of(scene)[0].min_distance < 0.4
+    assert brush._brush_of(scene)[0].min_distance < 0.4
     painted.source = 'MIX'
     _choose(settings, "oak", "grass")
-    assert brush.brush_of(scene)[0].min_distance > 2.0
+    assert brush._brush_of(scene)[0].min_distance > 2.0
     painted.density = 10_000.0
     painted.radius = 0.5
-    assert brush.brush_of(scene)[0].min_distance < 0.05
+    assert brush._brush_of(scene)[0].min_distance < 0.05
     bpy.context.view_layer.update()
     bpy.ops.tetflora.paint_plants(mode='PAINT', stroke="0 0 1")
     assert painted.strokes == 1
     assert painted.distance_by_species
     painted.min_distance = 0.7
-    assert brush.brush_of(scene)[0].min_distance == pytest.approx(0.7)
+    assert brush._brush_of(scene)[0].min_distance == pytest.approx(0.7)
 
 
 def test_species_that_cannot_be_compiled_have_a_distance_too():
@@ -150,6 +150,6 @@ def test_the_first_species_is_offered_first_everywhere():
     _ground()
     population = _populate(count=3)
     assert [entry.species for entry in population.mix] == [catalog.FIRST]
-    assert brush.brush_of(scene)[1] == (catalog.FIRST,)
+    assert brush._brush_of(scene)[1] == (catalog.FIRST,)
     bpy.ops.tetflora.edit_list(owner="scene.tetflora", entries="leaf_objects", action='ADD')
     assert scene.tetflora.leaf_objects[0].species == catalog.FIRST

@@ -108,19 +108,13 @@ def test_what_a_file_does_not_say_is_as_in_a_new_scene():
         (lambda d: d.update(seed=2**40), '"seed" is'),
         (lambda d: d.update(seed=10**400), '"seed" is inf; it must be a whole number'),
         (lambda d: d.update(slope_max=10**400), '"slope_max" is inf; it must be a finite number'),
-        (
-            lambda d: d.update(altitude_min=1e300),
-            '"altitude_min" is 1e+300; it must be a finite number',
-        ),
+        (lambda d: d.update(altitude_min=1e300), '"altitude_min" is 1e+300; it must be a finite number'),
         (lambda d: d.update(name="a\0b"), '"name" is \'a\\x00b\'; it must be one line'),
         (lambda d: d.update(uv_layer="a\nb"), '"uv_layer" is \'a\\nb\'; it must be one line'),
         (lambda d: d.update(name="a" * 2000), "it must be one line of at most 1000 characters"),
         (lambda d: d.update(grounds=["\ud800"]), "half of a surrogate pair"),
         (lambda d: d.update({"\x1b[2J" * 999: 1}), 'layer 1 has an unknown key " [2J'),
-        (
-            lambda d: d.update(species=[{"species": "../a"}]),
-            'species 1: "species" is \'../a\'; use only',
-        ),
+        (lambda d: d.update(species=[{"species": "../a"}]), 'species 1: "species" is \'../a\'; use only'),
         (
             lambda d: d.update(species=[{"species": "oak", "companion": "a b"}]),
             'species 1: "companion" is \'a b\'; use only letters',

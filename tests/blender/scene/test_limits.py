@@ -124,7 +124,7 @@ def test_wind_populations_and_brush_have_limits_too(scene):
         setattr(group, name, good)
     _store(scene.tetflora.brush, "radius", math.nan)
     with pytest.raises(errors.SceneError, match="Brush: Radius is nan; it must be"):
-        brush.brush_of(scene)
+        brush._brush_of(scene)
 
 
 @pytest.mark.parametrize(

@@ -71,11 +71,7 @@ def test_forms_and_ages_do_not_get_into_each_others_way(scene):
     (plant,) = row_of_plants([7.0])
     plant.tetflora.skeleton = form
     (kind,) = seeds(scene).identifiers
-    assert (Kind.read(kind).species, skeletons.skeleton_object_of(kind), Kind.read(kind).age) == (
-        SPECIES,
-        form,
-        7.0,
-    )
+    assert (Kind.read(kind).species, skeletons.skeleton_object_of(kind), Kind.read(kind).age) == (SPECIES, form, 7.0)
     assert contents.estimate(scene, depsgraph()).polygons_full > 0
 
 

@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tests.blender.scenes import add_camera
-from tetflora_addon.blender.scene.camera import camera_of, is_rendered, read_camera, view_camera, viewport_of
+from tetflora_addon.blender.scene.camera import _camera_of, is_rendered, read_camera, view_camera, viewport_of
 
 pytestmark = pytest.mark.usefixtures("clean_file")
 
@@ -32,7 +32,7 @@ def test_the_matrices_of_a_camera_give_that_camera(angles, place, lens, shift, k
     graph, size = bpy.context.evaluated_depsgraph_get(), (scene.render.resolution_x, scene.render.resolution_y)
     projection = np.array(camera.calc_matrix_camera(graph, x=size[0], y=size[1]), np.float64)
     view = np.array(camera.matrix_world.inverted(), np.float64)
-    made = camera_of(view, projection, (data.clip_start, data.clip_end), size)
+    made = _camera_of(view, projection, (data.clip_start, data.clip_end), size)
     expected = read_camera(scene, graph)
     assert made.kind == expected.kind
     assert (made.width, made.height) == (expected.width, expected.height)

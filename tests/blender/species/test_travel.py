@@ -12,7 +12,7 @@ import pytest
 
 from tests.blender.scenes import add_camera, add_mesh, add_plant, depsgraph
 from tetflora_addon.blender.assets.marks import stop_using, use_as_species
-from tetflora_addon.blender.assets.places import plant_places
+from tetflora_addon.blender.assets.places import _plant_places
 from tetflora_addon.blender.job import refine
 from tetflora_addon.blender.placing.plant_objects import link_field
 from tetflora_addon.blender.scene.fields import write_field
@@ -130,7 +130,7 @@ def models(tmp_path):
 
 def models_seen():
     """Names of what plants look like, after they are refined as well."""
-    found = [(p.target.shown.name, len(p)) for p in plant_places(bpy.context.scene, depsgraph())]
+    found = [(p.target.shown.name, len(p)) for p in _plant_places(bpy.context.scene, depsgraph())]
     small_picture()
     bpy.context.scene.tetflora.asset_detail = 'REFINE'
     assert refine.refine(bpy.context.scene, depsgraph()).instances == 2
@@ -144,7 +144,7 @@ def test_plants_that_are_models_have_them(models, link, tmp_path):
     path = str(tmp_path / "second.blend")
     bpy.ops.wm.save_as_mainfile(filepath=path)
     bpy.ops.wm.open_mainfile(filepath=path)
-    assert len(plant_places(bpy.context.scene, depsgraph())) == 2
+    assert len(_plant_places(bpy.context.scene, depsgraph())) == 2
 
 
 def test_a_model_that_is_used_no_more_does_not_come_back(models):

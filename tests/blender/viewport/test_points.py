@@ -30,7 +30,7 @@ def _populate(count, **options):
 
 
 def _dots():
-    return points.dots_of(bpy.context.scene, depsgraph())
+    return points._dots_of(bpy.context.scene, depsgraph())
 
 
 def test_dots_stand_where_plants_will():

@@ -197,7 +197,7 @@ def test_while_the_timeline_runs_plants_are_read_once_and_at_rest_all_are_shown(
     seen = []
     for day, years in ((200.0, 0.0), (20.0, 0.0), (20.0, 5.0), (20.0, 60.0)):
         year.day, year.years = day, years
-        levels.follow(scene, depsgraph(), preview, views)
+        levels._follow(scene, depsgraph(), preview, views)
         assert 60 < preview.shapes.plants < 140
         assert preview.shapes.of == number
         assert preview.shapes.positions[:, 0].max() < 40.0
@@ -206,10 +206,10 @@ def test_while_the_timeline_runs_plants_are_read_once_and_at_rest_all_are_shown(
     assert len(reads) == 1
     assert not np.allclose(seen[0][0], seen[1][0], atol=0.02)  # autumn's crowns are bare in winter
     assert seen[2][1] < 0.5 * seen[3][1]
-    levels.follow(scene, depsgraph(), preview, [views[0] + np.diag([0, 0, 0, 9.0])])
+    levels._follow(scene, depsgraph(), preview, [views[0] + np.diag([0, 0, 0, 9.0])])
     assert len(reads) == 1  # another view looks at the same plants
     for year.years in (60.0, 0.0):
-        levels.follow(scene, depsgraph(), preview, [np.diag([0.025, 0.025, -0.01, 1.0]) + np.diag([9.0], 3)])
+        levels._follow(scene, depsgraph(), preview, [np.diag([0.025, 0.025, -0.01, 1.0]) + np.diag([9.0], 3)])
         assert preview.shapes is None or preview.shapes.plants == 0  # it looks past them
     year.day, year.years = 180.0, 0.0
     after = read_shapes(scene, depsgraph())

@@ -106,11 +106,7 @@ SHAPES = st.fixed_dictionaries(
     }
 )
 LEANS = st.fixed_dictionaries(
-    {
-        "angle": ranges(0, 180, 40),
-        "angle_tip": st.floats(0, 180),
-        "spray": st.sampled_from([0.0, 1.0]),
-    }
+    {"angle": ranges(0, 180, 40), "angle_tip": st.floats(0, 180), "spray": st.sampled_from([0.0, 1.0])}
 )
 SPUR: dict[str, Any] = {
     "length": [0.3, 0.2], "thickness": [0.05, 0.02], "flare": 2.0, "segments": 3, "curvature": [90, 60],

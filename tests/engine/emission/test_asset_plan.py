@@ -21,13 +21,7 @@ from tests.engine.refinement.test_asset_parts import check_cover, grove, placed_
 from tetflora_addon.assets.costs import NEVER, OriginalPolicy
 from tetflora_addon.camera.camera import Camera
 from tetflora_addon.emission import drawing
-from tetflora_addon.emission.asset_plan import (
-    ASSETS,
-    AssetPlan,
-    ClusterRows,
-    PlacedClusters,
-    explicit_plan,
-)
+from tetflora_addon.emission.asset_plan import ASSETS, AssetPlan, ClusterRows, PlacedClusters, explicit_plan
 from tetflora_addon.proxies import microsurfaces
 from tetflora_addon.proxies.microsurfaces import Facets
 from tetflora_addon.refinement.decisions import Decision

@@ -16,14 +16,7 @@ from tetflora_addon.buffers import MeshBuffers, PointBuffers
 from tetflora_addon.camera.camera import Camera
 from tetflora_addon.emission.emitters import FacetForm, facet_blocks
 from tetflora_addon.proxies.microsurfaces import Facets
-from tetflora_addon.proxies.primitives import (
-    LEAST_COVER,
-    SKYLIGHT,
-    facing,
-    joined,
-    shape_buffers,
-    spheres_of,
-)
+from tetflora_addon.proxies.primitives import LEAST_COVER, SKYLIGHT, facing, joined, shape_buffers, spheres_of
 
 EYE = np.array([2.0, -30.0, 4.0])
 

@@ -6,7 +6,7 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tetflora_addon.emission.shells import shell_buffers
+from tetflora_addon.emission.shells import _shell_buffers
 from tetflora_addon.light.receivers import MediumCells
 from tetflora_addon.tetrahedra.geometry import signed_volume
 
@@ -17,7 +17,7 @@ def cells(seed: int, count: int = 20, origin: float = 0.0) -> np.ndarray:
 
 
 def build(vertices: np.ndarray, color: np.ndarray | None = None, **options):
-    return shell_buffers(medium(vertices, np.array([4.0, 1.0, 9.0, 0.0, 0.0, 0.0]), color), **options)
+    return _shell_buffers(medium(vertices, np.array([4.0, 1.0, 9.0, 0.0, 0.0, 0.0]), color), **options)
 
 
 def medium(vertices: np.ndarray, matrices: np.ndarray, color: np.ndarray | None = None) -> MediumCells:

@@ -25,17 +25,7 @@ from tetflora_addon.export.forest import (
     written_whole,
 )
 from tetflora_addon.export.gltf import write_gltf
-from tetflora_addon.export.images import (
-    TEXELS,
-    Palette,
-    atlas,
-    halved,
-    in_atlas,
-    outline,
-    palette_of,
-    png,
-    tiled,
-)
+from tetflora_addon.export.images import TEXELS, Palette, atlas, halved, in_atlas, outline, palette_of, png, tiled
 from tetflora_addon.export.levels import levels_of
 from tetflora_addon.export.obj import write_obj
 from tetflora_addon.growth.seeds import Seeds

@@ -17,7 +17,7 @@ from tests.engine import support
 from tetflora_addon.camera.camera import Camera
 from tetflora_addon.emission.shells import set_apart
 from tetflora_addon.light import buffers
-from tetflora_addon.light.illumination import Illumination, Sources, Surfaces, shadow_steps
+from tetflora_addon.light.illumination import Illumination, Sources, Surfaces, _shadow_steps
 from tetflora_addon.light.receivers import MediumCells, SurfaceElements
 from tetflora_addon.light.scattering import (
     DIRECTIONS,
@@ -37,6 +37,7 @@ DARK = World.plain((0, 0, 0))
 DOWN = np.array([0.0, 0.0, -1.0])
 SUN = Light("SUN", np.zeros(3), DOWN, color=np.array([3.0, 2.0, 1.0]))
 NONE = np.array([-1])  # no tetrahedron
+NOTHING = np.zeros((0, 3, 3))
 # Kuhn's division of a cube.
 _KUHN = [(1, 3, 7), (1, 5, 7), (2, 3, 7), (2, 6, 7), (4, 5, 7), (4, 6, 7)]
 
@@ -47,7 +48,7 @@ def shadow_pass(
     """All steps of the pass at once; ``ground`` is the color of the occluders."""
     occluders = np.zeros((0, 3, 3)) if occluders is None else occluders
     sources = Sources(lights, world, occluders, np.array(options.pop("ground", (0.0, 0.0, 0.0))))
-    steps = shadow_steps(cells, sources, **options)
+    steps = _shadow_steps(cells, sources, **options)
     while True:
         try:
             next(steps)
@@ -377,7 +378,7 @@ def test_a_blade_of_grass_has_few_parts_and_no_gaps(outline, turn, monkeypatch: 
     corners = corners @ [[np.cos(turn), np.sin(turn), 0.0], [-np.sin(turn), np.cos(turn), 0.0], [0.0, 0.0, 1.0]]
     held = counted_points(monkeypatch)
     blade = SurfaceElements(corners[None], np.zeros(1, int), np.ones(6, bool))
-    (buffer,) = buffers_of(SUN, box(1.0, 1), blade, None, 256)
+    (buffer,) = buffers_of(SUN, box(1.0, 1), blade, NOTHING, 256)
     pixel = 4.0 / 256
     assert sum(held) < 10 * 0.5 / pixel
     area = np.linalg.norm(np.cross(corners[2] - corners[0], corners[3] - corners[1])) / 2
@@ -392,7 +393,7 @@ def test_what_a_view_of_a_lamp_does_not_show_costs_it_nothing(monkeypatch: pytes
     corners, cell = random_sheets(11, 200, 0.01)
     held = counted_points(monkeypatch)
     lamp = Light("POINT", np.array([0.1, 0.2, -2.0]), DOWN)
-    made = buffers_of(lamp, box(1.0, 1), sheets_in(corners, cell, 6), None, 128)
+    made = buffers_of(lamp, box(1.0, 1), sheets_in(corners, cell, 6), NOTHING, 128)
     assert len(made) == 6
     assert sum(held) < 6 * 200
 
@@ -433,8 +434,9 @@ def test_a_view_of_what_is_near_gives_the_light_of_the_whole():
     """Cells, and ground beneath: the shadow at points that both views see is the same, but for the pixels' size."""
     cloud = box(0.3)
     points, cells = inside(3, 200, cloud)
-    whole = buffers_of(SUN, cloud, SurfaceElements.none(len(cloud)), None, 256)
-    both = buffers_of(SUN, cloud, SurfaceElements.none(len(cloud)), None, 256, Near(np.array([1.0, 1.0, 0.0]), (0.8,)))
+    whole = buffers_of(SUN, cloud, SurfaceElements.none(len(cloud)), NOTHING, 256)
+    near = Near(np.array([1.0, 1.0, 0.0]), (0.8,))
+    both = buffers_of(SUN, cloud, SurfaceElements.none(len(cloud)), NOTHING, 256, near)
     assert len(whole) == 1
     assert len(both) == 2
     own = cloud.own_depth(points, cells, np.array([0.0, 0.0, 1.0]))

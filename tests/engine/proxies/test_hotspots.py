@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 from tests.engine import support
 from tetflora_addon.growth.growth import trunks
-from tetflora_addon.proxies.hotspots import LightRatios, balance, balanced_colors, light_ratios, mean_overlap, overlap
+from tetflora_addon.proxies.hotspots import LightRatios, _balance, balanced_colors, light_ratios, mean_overlap, overlap
 from tetflora_addon.refinement.lights import Light
 
 EXTINCTION = st.floats(0.01, 20.0)
@@ -38,7 +38,7 @@ def test_overlap_is_the_integral_of_the_bidirectional_gap_probability(a: float) 
 def test_light_in_all_directions_stays(extinction: float, leaf: float, times: float) -> None:
     psi = (np.arange(4000) + 0.5) / 4000 * np.pi / 2
     chord, one = 2.0 * np.sin(psi / 2), np.ones(len(psi))
-    ratio = balance(chord, extinction * one, leaf * one, times * leaf * one)
+    ratio = _balance(chord, extinction * one, leaf * one, times * leaf * one)
     # Facets send by their own overlap; balanced, the mean is theirs.
     own = overlap(0.6 * extinction * times * leaf / np.maximum(chord, 1e-3))
     weight = np.sin(psi) * np.cos(psi)  # through a surface that faces the lamp
@@ -49,12 +49,12 @@ def test_light_in_all_directions_stays(extinction: float, leaf: float, times: fl
 def test_facets_as_large_as_leaves_stay_as_they_are(extinction: float, leaf: float) -> None:
     chord = np.linspace(0.0, 2.0, 20)
     same = np.full(20, leaf)
-    assert balance(chord, np.full(20, extinction), same, same) == pytest.approx(np.ones(20))
+    assert _balance(chord, np.full(20, extinction), same, same) == pytest.approx(np.ones(20))
 
 
 def test_near_the_shadow_of_the_eye_large_facets_are_dimmed_and_far_from_it_lightened() -> None:
     chord = 2.0 * np.sin(np.radians([10.0, 80.0]) / 2)
-    near, far = balance(chord, np.full(2, 0.2), np.full(2, 0.18), np.full(2, 0.8))
+    near, far = _balance(chord, np.full(2, 0.2), np.full(2, 0.18), np.full(2, 0.8))
     assert near < 0.97
     assert far > 1.0
 

@@ -90,7 +90,7 @@ def in_a_tree(placed: PlacedAssets, seed: int, rounds: int = 2) -> tuple[Tetrahe
     eye = rng.uniform(-12, 12, 3) * [1, 1, 0.3] + [0, 0, 2]
     camera = support.camera(eye, rng.uniform(-3, 3, 3))
     shared = SharedAssets(placed, camera)
-    tree = view_root(camera, shared.parts.bounding_box())
+    tree = view_root(camera, support.box_around(shared.parts))
     root = np.arange(len(tree)) == 0
     shared.update(tree, root, np.where(root, np.inf, 0.0))
     while rounds > 0:

@@ -14,7 +14,7 @@ from tetflora_addon.camera.camera import Camera, expected_pixels
 from tetflora_addon.refinement.decisions import Decision
 from tetflora_addon.refinement.rasterize import pixel_rays
 from tetflora_addon.refinement.settings import RefinementSettings
-from tetflora_addon.refinement.visibility import PanoramaBuffer, face_cameras, pixels_per_solid_angle
+from tetflora_addon.refinement.visibility import _PanoramaBuffer, face_cameras, pixels_per_solid_angle
 from tetflora_addon.tetrahedra.roots import world_root
 
 SPHERE = (-np.pi, np.pi, -np.pi / 2, np.pi / 2)
@@ -74,7 +74,7 @@ def test_a_random_scene_agrees_with_rays(window: tuple[float, ...]) -> None:
     camera = panorama(window)
     vertices, rank = cells_around(120)
     extinction = np.random.default_rng(2).choice([0.0, 0.3, 1.5], len(vertices))
-    buffer = PanoramaBuffer(camera, 128)
+    buffer = _PanoramaBuffer(camera, 128)
     outline = buffer.add(np.arange(len(vertices)), vertices, extinction)
     seen = buffer.transmittance(rank)
     pixels, wanted = cast(vertices, extinction, camera)

@@ -20,7 +20,7 @@ from tetflora_addon.emission.polygons import PolygonBlock, kept_polygons, polygo
 from tetflora_addon.emission.shells import proxy_shells
 from tetflora_addon.growth.seeds import Branches
 from tetflora_addon.proxies.microsurfaces import Facets
-from tetflora_addon.refinement.contents import Contents, InCells, cut, in_the_root, sort_into_children
+from tetflora_addon.refinement.contents import Contents, InCells, _cut, in_the_root, sort_into_children
 from tetflora_addon.refinement.contents import sums as sums_by_node
 from tetflora_addon.refinement.decisions import Decision
 from tetflora_addon.refinement.loop import Refinement, refine
@@ -105,7 +105,7 @@ def divided(polygons: Polygons, seed: int, slack: float, rounds: int = 4) -> tup
     """Polygons in a tree that a camera roots and random choices divide."""
     rng = np.random.default_rng(seed)
     camera = support.camera(rng.uniform(-9, 9, 3), rng.uniform(-3, 3, 3))
-    tree = view_root(camera, polygons.bounding_box())
+    tree = view_root(camera, support.box_around(polygons))
 
     def loose(points: np.ndarray) -> np.ndarray:
         return np.full(len(points), slack)
@@ -175,7 +175,7 @@ def test_a_plane_leaves_each_piece_on_one_side(seed: int) -> None:
     polygons = Polygons.everything(placed(thicket(seed), seed))
     normal = rng.normal(size=(len(polygons), 3))
     planes = np.c_[normal / np.linalg.norm(normal, axis=1, keepdims=True), rng.uniform(-1, 1, len(polygons))]
-    owner, side, parts = cut(polygons, planes)
+    owner, side, parts = _cut(polygons, planes)
     total = np.bincount(owner, area_fractions(parts.weights)[parts.part], len(polygons))
     np.testing.assert_allclose(total, polygons.meshes.face_size[polygons.face] - 2, atol=1e-12)
     distance = parts.corner_distances(planes[owner]) * np.where(side, 1, -1)[:, None]

@@ -24,7 +24,7 @@ from tetflora_addon.refinement import shared_parts
 from tetflora_addon.refinement.contents import PlantParts, Totals, bounding_box, subplant_totals, sums
 from tetflora_addon.refinement.loop import refine, step_of
 from tetflora_addon.refinement.settings import RefinementSettings
-from tetflora_addon.refinement.shared_parts import LARGE, SharedPlants, opened, share_points
+from tetflora_addon.refinement.shared_parts import LARGE, SharedPlants, _share_points, opened
 from tetflora_addon.subplants.pieces import expand
 from tetflora_addon.tetrahedra.geometry import squared_edges, volume
 from tetflora_addon.tetrahedra.roots import view_root
@@ -207,7 +207,7 @@ def test_points_are_on_their_parts(kind: str) -> None:
     level = [(parts, lines)]
     while level:
         parts, lines = level.pop()
-        points = share_points(flora, parts, plants.pixels(parts), lines)
+        points = _share_points(flora, parts, plants.pixels(parts), lines)
         assert len(np.unique(points.part)) == len(parts)
         branches = parts.branches.take(points.part)
         if lines is None:
@@ -236,11 +236,11 @@ def test_more_points_where_there_are_more_pixels() -> None:
     """Their number is limited on both sides; a part without leaves, or without wood, has points for the other only."""
     flora = support.small_flora()
     parts = PlantParts.of_subplants(flora, trunks(flora.rows, support.plants(np.zeros(6, int))))
-    numbers = np.bincount(share_points(flora, parts, np.array([0.0, 1.0, 50.0, 200.0, 1e4, 1e9])).part)
+    numbers = np.bincount(_share_points(flora, parts, np.array([0.0, 1.0, 50.0, 200.0, 1e4, 1e9])).part)
     assert (np.diff(numbers) >= 0).all()
     assert numbers[0] == numbers[1] < numbers[2] < numbers[3] <= numbers[4] == numbers[5]
     leafless = replace(parts, totals=replace(parts.totals, leaf_area=np.zeros(6)))
-    points = share_points(flora, leafless, np.full(6, 100.0))
+    points = _share_points(flora, leafless, np.full(6, 100.0))
     assert (points.leaf == 0).all()
     np.testing.assert_allclose(np.bincount(points.part, points.wood), parts.totals.wood_area, rtol=1e-6)
     assert np.allclose(points.optical_area, points.wood / 2)
@@ -355,7 +355,7 @@ def test_parts_in_front_of_each_other_have_no_more_points_than_a_limit() -> None
     numbers = []
     for count in (1, 50):
         parts = PlantParts.of_subplants(flora, trunks(flora.rows, support.grove(count, 0.5)))
-        points = share_points(flora, parts, np.full(count, 1e4), room=5_000)
+        points = _share_points(flora, parts, np.full(count, 1e4), room=5_000)
         leaves = points.take(np.flatnonzero(points.leaf > 0))
         area = np.bincount(leaves.part, leaves.leaf, count)
         np.testing.assert_allclose(area, parts.totals.leaf_area, rtol=1e-5)

@@ -102,23 +102,10 @@ def _read_one(mesh: bpy.types.Mesh, materials: list[bpy.types.Material | None], 
     )
 
 
-def measure(variants: Iterable[tuple[Target, Floats]], depsgraph: bpy.types.Depsgraph) -> dict[str, Any]:
+def _measure(variants: Iterable[tuple[Target, Floats]], depsgraph: bpy.types.Depsgraph) -> dict[str, Any]:
     """Means over the variants of a species, by the properties of `TetFloraAssetSpecies`, and a picture of the first.
 
-    Parameters
-    ----------
-    variants : iterable
-        Targets, each with the matrix (4, 4) from its space to that of the plant.
-
-    Returns
-    -------
-    dict
-        Empty where nothing has a face.
-
-    Raises
-    ------
-    SceneError
-        Something instances itself.
+    Each variant has a matrix (4, 4) from its space to that of the plant. Nothing where none has a face.
     """
     found, looks = [], Looks()
     for target, matrix in variants:
@@ -132,7 +119,7 @@ def measure(variants: Iterable[tuple[Target, Floats]], depsgraph: bpy.types.Deps
 
 
 def size_of(variants: Iterable[tuple[Target, Floats]], depsgraph: bpy.types.Depsgraph) -> tuple[float, float]:
-    """Radius and height alone, as `measure` finds them, at a fraction of the cost; zeros where nothing has a face."""
+    """Radius and height alone, as `_measure` finds them, at a fraction of the cost; zeros where nothing has a face."""
     found = []
     for target, matrix in variants:
         boxes = [(low, high, matrix @ places) for low, high, places in _boxes(target, depsgraph)]
@@ -311,7 +298,7 @@ def _identifier(datablock: Datablock) -> str:
 
 def measure_again(depsgraph: bpy.types.Depsgraph, entry: TetFloraAssetSpecies) -> bool:
     """Measure an asset and draw its picture; false where it has no faces."""
-    found = measure(variants_of(entry, depsgraph), depsgraph)
+    found = _measure(variants_of(entry, depsgraph), depsgraph)
     for name, value in ({"name": (entry.object or entry.collection).name} | found if found else {}).items():
         setattr(entry, name, value)
     return bool(found)

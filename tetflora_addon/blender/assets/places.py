@@ -493,18 +493,17 @@ def read_places(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> list[
         A transform that is not a number, a species whose collection has no object with faces, or a marked object of a
         kind that cannot be read; the message names the object.
     """
-    found = plant_places(scene, depsgraph)
+    found = _plant_places(scene, depsgraph)
     marked = sorted((o for o in renderable_objects(depsgraph.view_layer) if is_scatter(o)), key=lambda o: o.name_full)
     for scatter in read_scatters(marked, depsgraph).values():
         found += scatter.places
     return found
 
 
-def plant_places(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> list[Places]:
+def _plant_places(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> list[Places]:
     """Places of plants whose species is an asset, by the variants of each.
 
     An object stands as it is turned and scaled in the scene, at the place of the plant instead of its own.
-    Errors are those of `read_places`.
     """
     read = read_asset_plants(scene, depsgraph)
     species = asset_species(scene)
@@ -625,9 +624,8 @@ class Scatter:
     def finish(self) -> None:
         """Gather the places of each target."""
         for target, parts in self._parts.items():
-            matrices, keys = (
-                column[0] if len(parts) == 1 else np.concatenate(column) for column in zip(*parts, strict=True)
-            )
+            columns = zip(*parts, strict=True)
+            matrices, keys = (own[0] if len(own) == 1 else np.concatenate(own) for own in columns)
             bad = int((~np.isfinite(matrices).all(axis=(1, 2))).sum())
             if bad:
                 raise SceneError(

@@ -143,9 +143,7 @@ def plant_biome_steps(data: JobData, biome: PropertyGroup) -> Job[BiomeResult]:
     return (yield from _plant(data, uid, *grown))
 
 
-def _grown(
-    names: Sequence[str], grow: Callable[[int], Job[GrownStand]]
-) -> Job[tuple[list[tuple[str, int]], list[str]]]:
+def _grown(names: list[str], grow: Callable[[int], Job[GrownStand]]) -> Job[tuple[list[tuple[str, int]], list[str]]]:
     """Grow stands by their numbers: names and numbers of plants of those that grew, and why others did not."""
     made, bare = [], []
     for number, name in enumerate(names):
@@ -226,9 +224,7 @@ def growing_of(scene: Scene, uid: str) -> list[Object]:
     return [obj for obj in stands_of(scene, uid) if has_history(obj) and not (obj.library or obj.data.library)]
 
 
-def _fill_stand(
-    layer: Mapping[str, Any], uid: str, renamed: Mapping[str, str], seed: int, stand: PropertyGroup
-) -> None:
+def _fill_stand(layer: dict[str, Any], uid: str, renamed: Mapping[str, str], seed: int, stand: PropertyGroup) -> None:
     """Give a stand the settings of a checked layer."""
     for name in stand_settings():
         if name in layer:

@@ -65,11 +65,8 @@ class Biome:
 def stand_settings() -> list[str]:
     """Names of settings of stands that mean something in any file."""
     numbers = [p.identifier for p in TetFloraStand.bl_rna.properties if p.type in {'INT', 'FLOAT', 'BOOLEAN'}]
-    return [
-        name
-        for name in numbers
-        if name not in ("is_grown", "last_year", "plants", "species_index", "path_distance", "limits_shown")
-    ]
+    of_a_file = {"is_grown", "last_year", "plants", "species_index", "path_distance", "limits_shown"}
+    return [name for name in numbers if name not in of_a_file]
 
 
 def read_biome(path: Path) -> Biome:
@@ -87,21 +84,15 @@ def _read(path: Path) -> tuple[Biome, bytes]:
     """A biome that was checked, and the content of its file."""
     try:
         content = read_whole(path, MAX_FILE_BYTES)
-        return checked(parse_json(content, stored.refuse_constant), path.stem), content
+        return _checked(parse_json(content, stored.refuse_constant), path.stem), content
     except OSError as error:
         raise SceneError(f"{path.name}: cannot read the file: {error.strerror}") from None
     except (ValueError, SpeciesError) as error:
         raise SceneError(f"{path.name}: {error}") from None
 
 
-def checked(data: Any, identifier: str) -> Biome:
-    """A decoded file.
-
-    Raises
-    ------
-    ValueError, SpeciesError
-        Something is not as it must be; names the key.
-    """
+def _checked(data: Any, identifier: str) -> Biome:
+    """A decoded file; errors name the key of what is not as it must be."""
     if isinstance(data, dict) and {"format", "version"} <= data.keys():  # keys are checked next
         if data["format"] != FORMAT:
             raise ValueError(f'"format" is {quoted(data["format"])}; files of biomes have "{FORMAT}"')
@@ -292,7 +283,7 @@ def save_biome(scene: Scene, name: str, description: str, picture: bool, replace
     identifier = new_identifier(name, lambda one: False)
     data = biome_data(scene, populations, active_biome(scene), name.strip(), description.strip())
     try:
-        checked(data, identifier)  # what is saved can be read
+        _checked(data, identifier)  # what is saved can be read
     except ValueError as error:
         raise SceneError(f'"{name}" cannot be saved: {error}') from None
     with tempfile.TemporaryDirectory() as folder:

@@ -97,17 +97,13 @@ class Parser(argparse.ArgumentParser):
 
 
 def main(arguments: Sequence[str]) -> int:
-    """Run one command on the open file.
+    """Run one command on the open file; returns the exit code, see above.
 
     Parameters
     ----------
     arguments : sequence of str
         What follows ``--command tetflora``.
 
-    Returns
-    -------
-    int
-        Exit code, see above.
     """
     return run(_parser(), arguments)
 
@@ -262,11 +258,8 @@ def _export(options: argparse.Namespace) -> dict:
 
 def _check_file() -> None:
     """Refuse to go on where Blender could not open the file, and would render its default cube instead."""
-    named = [
-        text
-        for text in takewhile(lambda text: text not in ("--command", "--"), sys.argv)
-        if re.search(r"\.blend\d*$", text)
-    ]
+    before = takewhile(lambda text: text not in ("--command", "--"), sys.argv)
+    named = [text for text in before if re.search(r"\.blend\d*$", text)]
     if named and not bpy.data.filepath:
         raise SceneError(f"{named[-1]} cannot be opened; see Blender's message above")
 

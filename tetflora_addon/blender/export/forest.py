@@ -181,12 +181,10 @@ def _settings(field: Object, matrix: Floats) -> dict[str, float | int | str | li
     return found | {"rotation_mode": mode} | {key: list(getattr(field, key)) for key in ("location", name, "scale")}
 
 
-def _points(
-    position: Floats, rotation: Floats, seeds: Seeds, ages: Floats | None, sizes: Sizes | None
-) -> PointAttributes:
+def _points(place: Floats, rotation: Floats, seeds: Seeds, ages: Floats | None, sizes: Sizes | None) -> PointAttributes:
     """Attributes of a field with some plants, in single precision."""
     found = {
-        "position": ('FLOAT_VECTOR', position),
+        "position": ('FLOAT_VECTOR', place),
         "rotation": ('QUATERNION', rotation),
         "scale": ('FLOAT', seeds.scale.astype(np.float32)),
         "species": ('INT', seeds.species.astype(np.int32)),

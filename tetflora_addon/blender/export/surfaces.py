@@ -123,7 +123,7 @@ def _on_trunks(scene: bpy.types.Scene, variants: Sequence[Variant]) -> Iterator[
         material = materials_of(scene, species_for(scene, variant.species), "bark", 0)[0]
         if variant.species not in found and girth and is_ours(material):
             tone, ends = np.full(3, 0.2), (np.zeros(2), np.array([1.0, _ABOVE + 1.0]))
-            texels = baked(material, tone, 0.0, TEXELS, *ends, float(girth), {"color": PASSES["color"]})["color"]
+            texels = _baked(material, tone, 0.0, TEXELS, *ends, float(girth), {"color": PASSES["color"]})["color"]
             found[variant.species] = texels.mean(axis=(1, 2), dtype=np.float64) / tone[0]
         if variant.species in found:
             rows, levels = found[variant.species], []
@@ -140,12 +140,9 @@ def _by_height(bark: MeshBuffers, rows: Floats, girth: float) -> MeshBuffers:
     sums = np.concatenate([[0.0], np.cumsum(rows[:top]) / top * _ABOVE])
     on = float(rows[top:].mean())
     first, v = bark.face_offsets[:-1], bark.attributes["UVMap"][1][:, 1]
-    low, high = (each.reduceat(v, first).astype(np.float64) for each in (np.minimum, np.maximum))
-    below, whole = (
-        np.interp(end, np.linspace(0.0, _ABOVE, top + 1), sums)
-        + on * (np.maximum(end - _ABOVE, 0.0) + np.minimum(end, 0.0))
-        for end in (low, high)
-    )
+    low, high = ends = np.stack([each.reduceat(v, first) for each in (np.minimum, np.maximum)]).astype(np.float64)
+    beyond = np.maximum(ends - _ABOVE, 0.0) + np.minimum(ends, 0.0)
+    below, whole = np.interp(ends, np.linspace(0.0, _ABOVE, top + 1), sums) + on * beyond
     factor = (whole - below) / np.maximum(high - low, 1e-9)
     factor = np.where((bark.attributes["tf_girth"][1] > girth / 2.0) & (high > low), factor, 1.0)[:, None]
     color = np.clip(bark.attributes["tf_color"][1] * factor, 0.0, 1.0).astype(np.float32)
@@ -246,7 +243,7 @@ def _details(material: bpy.types.Material, look: _Look) -> dict[str, Floats32]:
         uv, place = mesh.attributes["UVMap"][1][corner], mesh.positions[mesh.corner_verts[corner]]
         flat, long = (np.linalg.norm(of[:, 1] - of[:, 0], axis=1).sum() for of in (uv, place))
         meters = float(long / max(flat, 1e-9))
-    images = baked(material, look.color, look.mean("tf_transmission"), TEXELS, low, look.palette.size, meters)
+    images = _baked(material, look.color, look.mean("tf_transmission"), TEXELS, low, look.palette.size, meters)
     return {name: tiled(own) if is_bark else within(own) for name, own in images.items()}
 
 
@@ -303,7 +300,7 @@ PASSES = {"color": ('DIFFUSE', True), "roughness": ('ROUGHNESS', False), "normal
 _NAME = "TetFlora bake"
 
 
-def baked(
+def _baked(
     material: bpy.types.Material,
     color: Floats,
     through: float,
@@ -315,16 +312,8 @@ def baked(
 ) -> dict[str, Floats32]:
     """Texels (size, size, 3) of a material by the names of `PASSES`, row 0 lowest.
 
-    Parameters
-    ----------
-    color : (3,) float
-        Of the faces, linear RGB.
-    through : float
-        Their transmission.
-    low, extent : (2,) float
-        Texture coordinates that the square shows.
-    meters : float
-        To a unit of texture coordinates.
+    They are those of faces of a linear color (3,) and a transmission, over a square of texture coordinates from ``low``
+    on (2,), with so many meters to a unit of these.
     """
     found: dict[str, Floats32] = {}
     copy = material.copy()  # those of other files cannot be changed

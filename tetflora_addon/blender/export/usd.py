@@ -10,7 +10,7 @@ other USD are read as places of plants.
 Sources: UsdGeomPointInstancer and UsdPreviewSurface as openusd.org documents them.
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -28,10 +28,9 @@ from ...export.levels import PlantLevel
 from ...growth.hashing import child_key, key_of_seed, uniform
 from ...jobs import Progress
 from ...planting.rules import species_by_weight
-from ..attributes import write
 from ..compat import usd
 from ..geodata.origin import Import, Imported, Steps, importing
-from ..placing.plant_objects import link_field
+from ..placing.plant_objects import link_field, write_points
 
 #: In the custom data of an instancer, and the prefix of primvars.
 KEY, PREFIX = "tetflora", "tetflora:"
@@ -108,7 +107,12 @@ def _write_part(pxr: SimpleNamespace, stage: object, path: str, part: ForestPart
     instancer.CreateOrientationsAttr(_array(pxr, "Quath", part.rotation.astype(np.float16)))
     instancer.CreateScalesAttr(_array(pxr, "Vec3f", np.repeat(part.scale[:, None], 3, axis=1)))
     primvars = pxr.UsdGeom.PrimvarsAPI(instancer)
-    columns = _columns(part)
+    columns = {
+        "species": ('INT', part.species),
+        "seed": stored_seeds(part.seed),
+        "age": ('FLOAT', part.age),
+        "height": ('FLOAT', part.height),
+    }
     for name, (kind, values) in columns.items():
         _add(pxr, primvars, name, kind, values)
     known = {"position": ('FLOAT_VECTOR', part.position), **{name: columns[name] for name in ("seed", "species")}}
@@ -134,16 +138,6 @@ def _write_part(pxr: SimpleNamespace, stage: object, path: str, part: ForestPart
             },
         },
     )
-
-
-def _columns(part: ForestPart) -> dict[str, tuple[str, NDArray]]:
-    """What every plant is, for whoever reads the file."""
-    return {
-        "species": ('INT', part.species),
-        "seed": stored_seeds(part.seed),
-        "age": ('FLOAT', part.age),
-        "height": ('FLOAT', part.height),
-    }
 
 
 def stored_seeds(seed: Integers) -> tuple[str, NDArray[np.int32]]:
@@ -234,12 +228,10 @@ def _write_surface(pxr: SimpleNamespace, stage: object, surface: BakedSurface) -
     place.CreateInput("varname", types.String).Set("st")
     for name, file in surface.textures.items():
         if name != "card":
-            _write_texture(pxr, stage, f"{path}/{name}", name, file, (shader, place))
+            _add_texture(pxr, stage, f"{path}/{name}", name, file, (shader, place))
 
 
-def _write_texture(
-    pxr: SimpleNamespace, stage: object, path: str, name: str, file: str, ends: tuple[object, object]
-) -> None:
+def _add_texture(pxr: SimpleNamespace, stage: object, path: str, name: str, file: str, ends: Sequence[object]) -> None:
     """A texture between the shaders that use it and that tell its place."""
     types, (shader, place) = pxr.Sdf.ValueTypeNames, ends
     image = pxr.UsdShade.Shader.Define(stage, path)
@@ -262,16 +254,11 @@ def _write_texture(
     shader.CreateInput(key, of).ConnectToSource(image.ConnectableAPI(), output)
 
 
-def read_parts(path: Path) -> Iterator[tuple[str, dict, PointAttributes]]:
+def _read_parts(path: Path) -> Iterator[tuple[str, dict, PointAttributes]]:
     """Plants of a file: for each instancer or cloud of points its name, custom data, and attributes of its points.
 
     Points that TetFlora has not written have the data ``{}``, and attributes in the world: places, and where they are
     told scales, and numbers that are named as those of fields.
-
-    Raises
-    ------
-    TetFloraError
-        It is no USD file, or holds no points.
     """
     pxr = library()
     try:
@@ -345,7 +332,7 @@ def forest_steps(order: Import, mix: Mapping[str, float]) -> Steps:
     made: list[bpy.types.Object] = []
     whole, missing, number = False, [], 0
     try:
-        for name, data, points in read_parts(order.path):
+        for name, data, points in _read_parts(order.path):
             if data and int(data.get("format", 0)) > FORMAT:
                 raise SceneError(f"{order.what}was written by a newer TetFlora; update the extension")
             if data:  # species that it counts through, each with the name of the object of its form
@@ -386,10 +373,7 @@ def _completed(points: PointAttributes, mix: Mapping[str, float]) -> tuple[Point
 def _field(name: str, data: Mapping, points: PointAttributes, kinds: list[tuple[str, str]]) -> bpy.types.Object:
     """A field that is in no collection yet."""
     mesh = bpy.data.meshes.new(name)
-    mesh.vertices.add(len(points["position"][1]))
-    for key, (kind, values) in points.items():
-        write(mesh, key, values, data_type=kind)
-    mesh.update()
+    write_points(mesh, points)
     obj = bpy.data.objects.new(name, mesh)
     group = obj.tetflora
     if data:

@@ -18,6 +18,7 @@ from pathlib import Path
 
 import bpy
 import numpy as np
+from bpy.types import Collection, Image, Material, Object, Scene
 from numpy.typing import NDArray
 
 from ...arrays import Floats, Integers
@@ -63,10 +64,8 @@ def read_raster(order: Import, path: Path | None = None) -> Job[Raster]:
 
     Raises
     ------
-    OSError
-        One cannot be read.
-    SceneError
-        One is broken, or lacks a place.
+    OSError, SceneError
+        One cannot be read, is broken, or lacks a place.
     """
     tiles, paths, code = [], [order.path, *order.tiles] if path is None else [path], order.epsg
     for path in paths:
@@ -130,8 +129,7 @@ def _png(path: Path) -> Raster:
     return replace(place_of_image(path), values=values)
 
 
-def _loaded(path: Path, unreadable: str) -> bpy.types.Image:
-    """An image of a file."""
+def _loaded(path: Path, unreadable: str) -> Image:
     try:
         return bpy.data.images.load(str(path), check_existing=False)
     except RuntimeError:
@@ -140,7 +138,7 @@ def _loaded(path: Path, unreadable: str) -> bpy.types.Image:
 
 @importing
 def terrain_steps(order: Import, most: int, image: Path | None = None) -> Steps:
-    """Make ground; yields progress. Closing the steps leaves all as it was.
+    """Make ground; see `importing`.
 
     Parameters
     ----------
@@ -148,11 +146,6 @@ def terrain_steps(order: Import, most: int, image: Path | None = None) -> Steps:
         Faces.
     image : Path, optional
         An orthophoto, which becomes its color.
-
-    Raises
-    ------
-    SceneError
-        The file is broken, or cannot lie in this scene.
     """
     raster = yield from read_raster(order)
     photo = None if image is None else _photo_place(image, raster.system)
@@ -205,7 +198,7 @@ def _photo_place(path: Path, ground: System) -> Raster:
     return place if place.system.epsg else replace(place, system=ground)
 
 
-def _photo_material(path: Path, cells: Floats) -> tuple[bpy.types.Material, Floats, int]:
+def _photo_material(path: Path, cells: Floats) -> tuple[Material, Floats, int]:
     """A material of an image, UV (n, 2) of places in its pixels (n, 2), and how many of these lie beside it."""
     unreadable = "Blender cannot read this image; write it as JPEG, PNG or 8-bit TIFF"
     image = _loaded(path, unreadable)
@@ -225,9 +218,7 @@ def _photo_material(path: Path, cells: Floats) -> tuple[bpy.types.Material, Floa
     return material, np.stack([cells[:, 0], size[1] - cells[:, 1]], axis=1) / size, int((~inside).sum())
 
 
-def _mesh(
-    name: str, points: NDArray, faces: NDArray, uv: NDArray, material: bpy.types.Material | None
-) -> bpy.types.Object:
+def _mesh(name: str, points: NDArray, faces: NDArray, uv: NDArray, material: Material | None) -> Object:
     """A smooth mesh with UV; soil if it has no material."""
     middle = np.round((points.min(axis=0) + points.max(axis=0)) / 2.0)
     middle[2] = 0.0
@@ -277,17 +268,12 @@ BUILDING_MARK = "tetflora_building"
 
 @importing
 def outline_steps(order: Import, kind: str = "") -> Steps:
-    """Make curves of the outlines in a file; yields progress. Closing the steps leaves all as it was.
+    """Make curves of the outlines in a file; see `importing`.
 
     Parameters
     ----------
     kind : str
         What all are taken for; empty to tell them by their keys.
-
-    Raises
-    ------
-    SceneError
-        The file is broken, or cannot lie in this scene.
     """
     progress = Progress(0.0, f"Reading {order.path.name}")
     yield progress
@@ -326,7 +312,7 @@ def outline_steps(order: Import, kind: str = "") -> Steps:
     return Imported(None, [f"Outlines imported: {told}", *notes, f"coordinates: {system.name}"])
 
 
-def building_areas(scene: bpy.types.Scene) -> list[Floats]:
+def building_areas(scene: Scene) -> list[Floats]:
     """Borders (k, 2) of the buildings that were imported into a scene, in world space."""
     return [
         (members(spline.points, "co", 4).astype(np.float64) @ np.array(obj.matrix_world).T)[:, :2]
@@ -336,7 +322,7 @@ def building_areas(scene: bpy.types.Scene) -> list[Floats]:
     ]
 
 
-def _remove(collections: list[bpy.types.Collection]) -> None:
+def _remove(collections: list[Collection]) -> None:
     """Take back what was drawn."""
     objects = [obj for collection in collections for obj in collection.objects]
     curves = [obj.data for obj in objects]
@@ -345,7 +331,7 @@ def _remove(collections: list[bpy.types.Collection]) -> None:
     bpy.data.batch_remove([*curves, *(material for material in materials if not material.users)])
 
 
-def _curve(outline: MapFeature, rings: list[Floats], heights: HeightGrid | None) -> bpy.types.Object:
+def _curve(outline: MapFeature, rings: list[Floats], heights: HeightGrid | None) -> Object:
     """One outline as an object; its points count from its first one, so that far ones are exact."""
     data = bpy.data.curves.new(outline.name, 'CURVE')
     filled = outline.closed and outline.kind in (WATER, BUILDING)
@@ -385,11 +371,11 @@ def _curve(outline: MapFeature, rings: list[Floats], heights: HeightGrid | None)
     return obj
 
 
-def _look(kind: str) -> bpy.types.Material:
+def _look(kind: str) -> Material:
     """The material of water, buildings or roads; that of an earlier import if there is one."""
     name, color, rough = _LOOKS[kind]
 
-    def build(graph: Graph, material: bpy.types.Material) -> None:
+    def build(graph: Graph, material: Material) -> None:
         material.diffuse_color = (*color, 1.0)
         surface = graph.node("ShaderNodeBsdfPrincipled", {"Base Color": (*color, 1.0), "Roughness": rough})
         graph.node("ShaderNodeOutputMaterial", {"Surface": surface})

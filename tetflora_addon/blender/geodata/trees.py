@@ -161,7 +161,7 @@ _GENERIC = "broadleaf_tree"
 def inventory_steps(
     order: Import, unknown: str, units: str, skip: bool, columns: Mapping[str, str] | None = None
 ) -> Steps:
-    """Make a field of the trees of a file; yields progress. Closing the steps leaves all as it was.
+    """Make a field of the trees of a file; see `importing`.
 
     Parameters
     ----------
@@ -169,11 +169,6 @@ def inventory_steps(
         `GENERIC`, `LEFT_OUT`, or the identifier of a species for trees of species that nobody knows.
     units, skip, columns
         As of `read_inventory`.
-
-    Raises
-    ------
-    SceneError
-        The file is broken, or cannot lie in this scene.
     """
     progress = Progress(0.0, f"Reading {order.path.name}")
     yield progress
@@ -242,9 +237,7 @@ def _species(inventory: Inventory, unknown: str) -> tuple[list[str], Integers32,
 
 @importing
 def canopy_steps(order: Import, mix: Mapping[str, float], least: float, below: Path | None = None) -> Steps:
-    """Make a field of the trees that a raster of canopy height shows; yields progress.
-
-    Closing the steps leaves all as it was.
+    """Make a field of the trees that a raster of canopy height shows; see `importing`.
 
     Parameters
     ----------
@@ -254,11 +247,6 @@ def canopy_steps(order: Import, mix: Mapping[str, float], least: float, below: P
         Height of the smallest tree, meters.
     below : Path, optional
         Elevations of the ground, which are subtracted.
-
-    Raises
-    ------
-    SceneError
-        The file is broken, has no trees, or cannot lie in this scene.
     """
     raster, what = (yield from read_raster(order)), order.what
     if below is not None:
@@ -276,11 +264,9 @@ def canopy_steps(order: Import, mix: Mapping[str, float], least: float, below: P
     along, down = along - middle, down - middle
     cell = float(np.sqrt(abs(along[0] * down[1] - along[1] * down[0])))
     if roofs := building_areas(order.scene):
-        flat_cells = replace(raster, corner=middle - along * (w // 2) - down * (h // 2), along=along, down=down)
-        flat_cells, number = yield from call_in_thread(
-            Progress(0.1, "Leaving out roofs"), without_areas, flat_cells, roofs
-        )
-        raster = replace(raster, values=flat_cells.values)
+        flat = replace(raster, corner=middle - along * (w // 2) - down * (h // 2), along=along, down=down)
+        flat, number = yield from call_in_thread(Progress(0.1, "Leaving out roofs"), without_areas, flat, roofs)
+        raster = replace(raster, values=flat.values)
         notes += [f"{number:,} cells on buildings left out"] * (number > 0)
     if cell > _COARSEST:
         raise SceneError(f"{what}its cells are {cell:.1f} m wide; trees can be told apart up to {_COARSEST:g} m")

@@ -187,9 +187,7 @@ def _plants(scene: Scene, plants: list[Object], carried: Floats) -> tuple[int, F
     return len(plants), matrices[:, :3, 3], *_aged(scene, scale, kinds, which, ages)
 
 
-def _aged(
-    scene: Scene, scale: Floats, kinds: list[str], which: Integers, ages: NDArray[np.floating]
-) -> tuple[Floats, list[str]]:
+def _aged(scene: Scene, scale: Floats, kinds: list[str], which: Integers, ages: Floats) -> tuple[Floats, list[str]]:
     """Scales of plants and their kinds, by their ages."""
     sound = np.where(sound_ages(ages), ages, 0.0).astype(np.float64)
     named, which, taller = crown_kinds(scene, kinds, which, sound if sound.any() else None)

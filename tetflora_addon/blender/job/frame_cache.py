@@ -67,8 +67,6 @@ def scene_digest(
     ----------
     camera : Camera, optional
         Instead of the scene's current one.
-    given : Given, optional
-        From `read_scene` for the scene.
 
     Raises
     ------
@@ -173,14 +171,12 @@ def camera_moves(scene: Scene) -> bool:
     return False
 
 
-def key_of(
-    scene: Scene, depsgraph: Depsgraph, layers: Sequence[ViewLayer], camera: Camera, given: SceneContents
-) -> str:
+def key_of(scene: Scene, depsgraph: Depsgraph, layers: Sequence[ViewLayer], camera: Camera, own: SceneContents) -> str:
     """Digest of all that results for view layers depend on, with their camera and contents.
 
     Errors are those of `scene_digest`.
     """
-    content = hashlib.sha256(scene_digest(scene, depsgraph, camera, given).encode())
+    content = hashlib.sha256(scene_digest(scene, depsgraph, camera, own).encode())
     add_to_digest(content, [scene.name, *(layer.name for layer in layers)])
     for group in (scene.tetflora, scene.tetflora.output, *scene.tetflora.output.species):
         add_to_digest(content, _values(group))

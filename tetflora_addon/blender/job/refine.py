@@ -331,16 +331,12 @@ def refine_steps(
 
     Parameters
     ----------
-    depsgraph : bpy.types.Depsgraph
-        Evaluated for the frame.
     for_render : bool
         Results get a collection of their own beside the artist's, and are refined for the render region.
     beside : sequence of bpy.types.Collection
         Earlier results that stay: those of other view layers.
     camera : Camera, optional
         Instead of the scene's current one.
-    given : SceneContents, optional
-        From `read_scene` for the scene.
     mark : str
         Suffix of the names of results.
     first_look : bool
@@ -467,17 +463,13 @@ def refine(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, **options: An
 
 
 def clear(scene: bpy.types.Scene, for_render: bool | None = None) -> int:
-    """Remove only what refinement made for a scene.
+    """Remove only what refinement made for a scene; how many datablocks that was.
 
     Parameters
     ----------
     for_render : bool, optional
         Only what was made for a render (True), only what the artist made (False), or both (None).
 
-    Returns
-    -------
-    int
-        Number of datablocks removed.
     """
     removed = remove_results(scene, {None: None, True: 'RENDER', False: 'VIEW'}[for_render])
     if not for_render:

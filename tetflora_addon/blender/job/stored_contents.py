@@ -3,8 +3,7 @@
 """Plants, meshes and lights of a scene as texts, which tell whether results are out of date.
 
 `frame_cache.scene_digest` knows exactly, but reads the scene as refining does: ten seconds for 100,000 plants. Here all
-is taken as stored, in small steps of a second in all, and only after Blender has told of a change. Who is seen is
-looked at always.
+is taken as stored, in small steps of a second in all, after Blender told of a change. Who is seen is always looked at.
 """
 
 from collections.abc import Generator, Iterator

@@ -9,7 +9,7 @@ the slope of u along the surface, which Bump nodes know.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from math import tau
 from typing import Any
 
@@ -122,15 +122,12 @@ class Knot:
     far: Term  # length of that; large where there is none
 
 
-def place_group() -> bpy.types.NodeTree:
+def _place_group() -> bpy.types.NodeTree:
     """The group "TetFlora Bark Place": where on a branch a point lies.
 
-    Returns
-    -------
-    bpy.types.NodeTree
-        Outputs Place, on the cylinder of radius 1 (in radii, moved by the branch's color), Turn, Along (radii), and
-        Perimeter, meters. The perimeter P is that of the branch where it is seen: a relief of height u times D tilts
-        the normal by θ with tan θ = D |∇u| = D / P (Mikkelsen 2010, "Bump mapping unparametrized surfaces on the GPU").
+    Outputs Place, on the cylinder of radius 1 (in radii, moved by the branch's color), Turn, Along (radii), and
+    Perimeter, meters. The perimeter P is that of the branch where it is seen: a relief of height u times D tilts
+    the normal by θ with tan θ = D |∇u| = D / P (Mikkelsen 2010, "Bump mapping unparametrized surfaces on the GPU").
     """
 
     def build(graph: Graph, _given: Any) -> dict[str, Any]:
@@ -153,11 +150,6 @@ def place_group() -> bpy.types.NodeTree:
 
 def bark_group(character: str) -> bpy.types.NodeTree:
     """The group "TetFlora <Character> Bark".
-
-    Parameters
-    ----------
-    character : str
-        One of `BARKS`.
 
     Returns
     -------
@@ -187,7 +179,7 @@ def bark_group(character: str) -> bpy.types.NodeTree:
     )
 
     def build(graph: Graph, given: dict[str, Term]) -> dict[str, Any]:
-        where = graph.outputs("ShaderNodeGroup", node_tree=place_group())
+        where = graph.outputs("ShaderNodeGroup", node_tree=_place_group())
         girth = graph.attribute("tf_girth", "Fac")
         girth = (girth < 1e-6) * _USUAL + girth
         scale = given["Scale"] * (girth / _USUAL) ** bark.power
@@ -220,14 +212,13 @@ def bark_group(character: str) -> bpy.types.NodeTree:
 
 def pattern_part(graph: Graph, character: str, place: Place) -> dict[str, Term]:
     """Group "TetFlora <Character> Bark Pattern": Tone, factors of the color, and Height, in widths of a feature."""
-    given = {field.name: getattr(place, field.name) for field in fields(place)}
 
     def build(inner: Graph, terms: dict[str, Term]) -> dict[str, Any]:
-        tone, height = _bark(character).pattern(inner, Place(**{name: terms[name.title()] for name in given}))
+        tone, height = _bark(character).pattern(inner, Place(**{name: terms[name.title()] for name in vars(place)}))
         return {"Tone": tone, "Height": height}
 
     name = f"TetFlora {character.capitalize()} Bark Pattern"
-    inputs = {name.title(): term for name, term in given.items()}
+    inputs = {name.title(): term for name, term in vars(place).items()}
     return graph.part(name, _VERSION, inputs, (("Tone", 'Color'), ("Height", 'Float')), build)
 
 
@@ -298,17 +289,10 @@ def cell(graph: Graph, place: Term) -> Cell:
     return Cell(border, abs(graph.parts(normal)[2]), graph.parts(first["Color"]), place - first["Position"])
 
 
-def knot(graph: Graph, place: Place, size: float, noise: Term, apart: float = 1.0) -> Knot:
-    """Scars of shed branches: sparse, and the larger the thicker the branch.
+def _knot(graph: Graph, place: Place, size: float, noise: Term, apart: float = 1.0) -> Knot:
+    """Scars of shed branches, sparse and the larger the thicker the branch: the largest eye has so many of its radii.
 
-    Parameters
-    ----------
-    size : float
-        Of the largest eye, in radii of the branch.
-    noise : Vector
-        Around .5; what makes their outline uneven.
-    apart : float
-        More than 1: fewer of them.
+    A noise around .5 makes their outlines uneven. Those that are farther apart are fewer.
     """
     spacing = _KNOTS_APART * apart
     where = bent(place.round * (1.0 / spacing), noise, 0.35 * size / spacing)
@@ -353,7 +337,7 @@ def tones(graph: Graph, value: Term, stops: Tones) -> Term:
 def ridged(graph: Graph, place: Place) -> tuple[Term, Term]:
     """Ridges that part and meet, broken by cracks across every width or three, with deep fissures between them."""
     wave = graph.noise(times(place.cells, 0.35, 0.9), 1.0)[1]
-    eye = knot(graph, place, _EYE, wave)
+    eye = _knot(graph, place, _EYE, wave)
     where = bent(around(graph, place, eye, _EYE), wave, 2.0, 0.45)
     strip = cell(graph, where)
     grain = graph.noise(times(bent(place.cells, wave, 1.2), 2.6, 9.0), 3.0, 0.7)[0]
@@ -376,7 +360,7 @@ def ridged(graph: Graph, place: Place) -> tuple[Term, Term]:
 def interlaced(graph: Graph, place: Place) -> tuple[Term, Term]:
     """Short narrow strips that lie over each other like laths, with thin cracks between."""
     wave = graph.noise(times(place.cells, 0.45, 1.2), 1.0)[1]
-    eye = knot(graph, place, _EYE, wave)
+    eye = _knot(graph, place, _EYE, wave)
     strip = cell(graph, bent(around(graph, place, eye, _EYE), wave, 2.2, 0.4))
     grain = graph.noise(times(bent(place.cells, wave, 1.2), 1.9, 6.0), 3.0, 0.7)[0]
     lath = graph.step(grain * 0.22 + strip.border, 0.1, 0.22)
@@ -393,7 +377,7 @@ def netted(graph: Graph, place: Place) -> tuple[Term, Term]:
     count = place.scale * (0.55 * tau)
     slope = count / (place.stretch * tau)
     bend = graph.parts(wave)
-    eye = knot(graph, place, _EYE, wave)
+    eye = _knot(graph, place, _EYE, wave)
     angle = place.turn * tau
     tangent = graph.xyz(-graph.math('SINE', angle), graph.math('COSINE', angle))
     turn = place.turn + graph.vector('DOT_PRODUCT', aside(graph, eye, _EYE / tau), tangent)
@@ -449,7 +433,7 @@ def _plates(graph: Graph, place: Place) -> tuple[Term, Term, Term, Term]:
 def scaly(graph: Graph, place: Place) -> tuple[Term, Term]:
     """Small round scales that lift at their borders and lie over each other."""
     noise, wave = graph.noise(times(place.cells, 0.6, 0.6), 4.0, 0.7)
-    eye = knot(graph, place, _TWIG, wave)
+    eye = _knot(graph, place, _TWIG, wave)
     scale = cell(graph, bent(around(graph, place, eye, _TWIG), wave, 1.5))
     border = noise * 0.3 + scale.border
     solid, lifted = graph.step(border, 0.13, 0.24), graph.step(border, 0.42, 0.2)
@@ -487,7 +471,7 @@ def smooth(graph: Graph, place: Place) -> tuple[Term, Term]:
     noise, wave = graph.noise(times(place.round, 1.6, 1.1), 5.0, 0.62)
     lines = graph.noise(times(place.cells, 0.35, 0.8), 3.0, 0.6)[0]
     wrinkle = graph.step(lines, 0.57, 0.66) * graph.step(noise, 0.62, 0.42)
-    eye = knot(graph, place, _SCAR, wave, apart=0.9)
+    eye = _knot(graph, place, _SCAR, wave, apart=0.9)
     ring, hollow = lips(graph, eye)
     brow = _brows(graph, eye)
     marks = graph.math('MAXIMUM', brow * 0.7, hollow)
@@ -513,7 +497,7 @@ def pitted(graph: Graph, place: Place) -> tuple[Term, Term]:
     spots = points(graph, bent(times(place.cells, 1.0, 1.0), wave, 0.5), 'MANHATTAN')
     size = (row * 0.36 + 0.17) * (graph.parts(spots["Color"])[0] * 0.9 + 0.5)
     pit = graph.step(spots["Distance"], size, size * 0.55)
-    eye = knot(graph, place, _SCAR, wave)
+    eye = _knot(graph, place, _SCAR, wave)
     ring, hollow = lips(graph, eye)
     rough = furrows(graph, place, 7.0, 2.4)
     cork = graph.math('MAXIMUM', pit, graph.math('MAXIMUM', hollow, _brows(graph, eye) * 0.8))
@@ -558,7 +542,7 @@ def peeling(graph: Graph, place: Place) -> tuple[Term, Term]:
     spots = points(graph, bent(times(place.round, 1.3, 8.0), wave, 0.4))
     size = graph.parts(spots["Color"])[0] ** 2.0 * 0.36 + 0.1
     dashes = graph.step(noise * 0.4 + (spots["Distance"] - 0.2), size, size * 0.75)
-    eye = knot(graph, place, _SCAR, wave, apart=0.85)
+    eye = _knot(graph, place, _SCAR, wave, apart=0.85)
     # A scar is a black diamond, wider than high, and its brows hang from it.
     flat = graph.vector('DOT_PRODUCT', abs(eye.off), (0.45, 0.45, 1.5))
     scar = graph.step(flat + (eye.far > 50.0) + noise * 0.9, 1.35, 0.85)

@@ -84,11 +84,6 @@ BLADES: dict[str, BladeLook] = {
 def blade_group(kind: str) -> bpy.types.NodeTree:
     """The group "TetFlora <Kind> Leaf Blade".
 
-    Parameters
-    ----------
-    kind : str
-        One of `BLADES`.
-
     Returns
     -------
     bpy.types.NodeTree

@@ -58,9 +58,6 @@ class Pyramid:
             # Of long images the short side counts: more noise, but nothing from beside the square.
             level = np.floor(np.log2(size * min(self.width[0], self.height[0])))
         level = np.clip(np.nan_to_num(level), 0, len(self.start) - 1).astype(np.int32)
-        outside = None
-        if extension == 'CLIP':
-            outside = (u < 0) | (u > 1) | (v < 0) | (v > 1)
         x, x0, x1 = _columns(u, self.width[level], self.columns[level], extension)
         y, y0, y1 = _columns(v, self.height[level], self.rows[level], extension)
         first, stride = self.start[level], self.columns[level]
@@ -69,8 +66,8 @@ class Pyramid:
         found += self._texels(low + x1) * (x * (1 - y))[..., None]
         found += self._texels(high + x0) * ((1 - x) * y)[..., None]
         found += self._texels(high + x1) * (x * y)[..., None]
-        if outside is not None:
-            found[outside] = 0
+        if extension == 'CLIP':
+            found[(u < 0) | (u > 1) | (v < 0) | (v > 1)] = 0
         color, alpha = np.ascontiguousarray(np.moveaxis(found[..., :3], -1, 0)), found[..., 3].copy()
         return color / np.maximum(alpha, 1e-6), alpha
 
@@ -99,15 +96,10 @@ def _columns(
     return x, np.clip(first, 0, columns - 1), np.clip(second, 0, columns - 1)
 
 
-def pyramid_of(image: bpy.types.Image, weighted: bool, most: int = MOST_TEXELS) -> Pyramid | None:
-    """The pyramid of an image; None if it has no pixels.
+def _pyramid_of(image: bpy.types.Image, weighted: bool, most: int) -> Pyramid | None:
+    """The pyramid of an image, of about so many columns or rows at most; None if it has no pixels.
 
-    Parameters
-    ----------
-    weighted : bool
-        Whether its alpha counts: coarser copies then have the color of what is not transparent.
-    most : int
-        If less than `MOST_TEXELS`, only about as many columns or rows are looked at.
+    Where its alpha counts, coarser copies have the color of what is not transparent.
     """
     if not (all(image.size) and image.channels):
         return None
@@ -119,20 +111,13 @@ def pyramid_of(image: bpy.types.Image, weighted: bool, most: int = MOST_TEXELS) 
     height, width = pixels.shape[:2]
     halvings = max(0, int(np.ceil(np.log2(max(width, height) / MOST_TEXELS))))
     levels = [_finest(image, pixels, weighted, halvings)]
-    widths = [np.array([width, height], np.float32) / (1 << halvings)]
     while max(levels[-1].shape[:2]) > 1:
         levels.append(_halved(levels[-1]))
-        widths.append(widths[-1] / 2)
-    sizes = [level.shape[0] * level.shape[1] for level in levels]
-    texels = np.concatenate([level.astype(np.float16).reshape(-1, 4) for level in levels])
-    return Pyramid(
-        texels=texels.view(np.uint64).reshape(-1),
-        start=np.cumsum([0, *sizes[:-1]]).astype(np.int32),
-        columns=np.array([level.shape[1] for level in levels], np.int32),
-        rows=np.array([level.shape[0] for level in levels], np.int32),
-        width=np.array(widths, np.float32)[:, 0],
-        height=np.array(widths, np.float32)[:, 1],
-    )
+    rows, columns = np.array([level.shape[:2] for level in levels], np.int32).T.copy()
+    start = np.cumsum(rows * columns, dtype=np.int32) - rows * columns
+    parts = np.float32(0.5) ** np.arange(halvings, halvings + len(levels), dtype=np.float32)
+    texels = np.concatenate([level.astype(np.float16).reshape(-1, 4) for level in levels]).view(np.uint64).reshape(-1)
+    return Pyramid(texels, start, columns, rows, width * parts, height * parts)
 
 
 def _finest(image: bpy.types.Image, pixels: Floats32, weighted: bool, halvings: int) -> Floats16:
@@ -410,12 +395,7 @@ FaceLooks = dict[str, NDArray[np.float16]]
 class FaceReader:
     """Reads looks of faces; images and means of materials are kept from one mesh to the next.
 
-    Images are forgotten when they take too much memory.
-
-    Parameters
-    ----------
-    most : int
-        See `pyramid_of`.
+    Images are forgotten when they take too much memory; ``most`` is as of `_pyramid_of`.
     """
 
     def __init__(self, most: int = MOST_TEXELS) -> None:
@@ -425,12 +405,12 @@ class FaceReader:
         self._pyramids: dict[tuple[bpy.types.Image, bool], Pyramid | None] = {}
 
     def pyramid(self, image: bpy.types.Image, weighted: bool) -> Pyramid | None:
-        """The pyramid of an image, see `pyramid_of`."""
+        """The pyramid of an image, see `_pyramid_of`."""
         key = image, weighted
         if key not in self._pyramids:
             if sum(p.texels.nbytes for p in self._pyramids.values() if p is not None) > _MOST_BYTES:
                 self._pyramids.clear()
-            self._pyramids[key] = pyramid_of(image, weighted, self._most)
+            self._pyramids[key] = _pyramid_of(image, weighted, self._most)
         return self._pyramids[key]
 
     def prepare(self, mesh: bpy.types.Mesh, materials: list[bpy.types.Material | None]) -> "MeshLooks":

@@ -75,8 +75,6 @@ def bark_material(species_name: str, character: str = "ridged") -> bpy.types.Mat
 
     Parameters
     ----------
-    species_name : str
-        Name as the artist reads it.
     character : str
         One of `bark.BARKS`. A species whose character changed gets a new material; the old one stays beside it.
 

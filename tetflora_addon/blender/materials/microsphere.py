@@ -252,7 +252,7 @@ _THIN = 0.05
 
 
 def shell_group() -> bpy.types.NodeTree:
-    """The group "TetFlora Shell": everything between the attributes of ``shell_buffers`` and a shader."""
+    """The group "TetFlora Shell": everything between the attributes of `emission.shells` and a shader."""
     inputs = (
         *LOBE_INPUTS,
         ("Roundness", 'Float', 1.0, UNIT, "0: particles face the viewer; 1: they are round"),
@@ -282,11 +282,9 @@ def shell_group() -> bpy.types.NodeTree:
     return node_group(SHELL, _GROUP_VERSION, inputs, ENGINES, build)
 
 
-def baked_shell_group() -> bpy.types.NodeTree:
+def _baked_shell_group() -> bpy.types.NodeTree:
     """The group "TetFlora Baked Shell": light that a cell gives off, and how much of what is behind passes through.
 
-    Notes
-    -----
     With constant density, and the scattered radiance J linear between where the ray enters (J₀) and leaves (J₁), a
     cell of optical depth τ = κℓ adds B = w₀ J₀ + w₁ J₁ to T = e^{−τ} times what is behind it (paper, section 7), where
     w₁ = (1 − e^{−τ}(1 + τ)) / τ and w₀ = 1 − (1 − e^{−τ}) / τ.
@@ -318,17 +316,17 @@ def baked_shell_group() -> bpy.types.NodeTree:
 
 
 def shell_material() -> bpy.types.Material:
-    """Material "TetFlora shell" of the mesh that `emission.shells.shell_buffers` describes, for Cycles and EEVEE.
+    """Material "TetFlora shell" of the mesh that `emission.shells` makes, for Cycles and EEVEE.
 
     A ray meets two faces a cell: the scene's ``cycles.transparent_max_bounces`` has to allow for that. EEVEE blends
-    faces in their order in the mesh: give ``shell_buffers`` the cells' ranks.
+    faces in their order in the mesh: give it the cells' ranks.
     """
     return surface_material(SHELL_MATERIAL, _MATERIAL_VERSION, _builder(shell_group))
 
 
 def baked_shell_material() -> bpy.types.Material:
-    """Material "TetFlora baked shell": the light of ``shell_buffers(light=...)``, without noise, unlit."""
-    return surface_material(BAKED_SHELL_MATERIAL, _BAKED_VERSION, _builder(baked_shell_group))
+    """Material "TetFlora baked shell": the light of `emission.shells`, without noise, unlit."""
+    return surface_material(BAKED_SHELL_MATERIAL, _BAKED_VERSION, _builder(_baked_shell_group))
 
 
 def _builder(group: Any) -> Any:

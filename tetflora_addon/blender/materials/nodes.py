@@ -50,29 +50,13 @@ def is_own(datablock: bpy.types.ID) -> bool:
     return is_ours(datablock) and datablock.library is None and datablock.override_library is None
 
 
-def get_or_create(
+def _get_or_create(
     collection: Any, name: str, version: int, new: Callable[[str], Datablock], build: Callable[[Datablock], None]
 ) -> Datablock:
     """The datablock of that name, built anew only if there is none or ours is of another version.
 
-    Parameters
-    ----------
-    collection : bpy_prop_collection
-        Such as ``bpy.data.materials``.
-    name : str
-        Name to look for and to give.
-    version : int
-        Version of what `build` makes; stamped on the datablock.
-    new : callable
-        Makes an empty datablock of a name.
-    build : callable
-        Fills the new datablock.
-
-    Returns
-    -------
-    bpy.types.ID
-        What an artist edited or put there under this name comes back untouched. An outdated datablock of ours, which
-        may be edited, gets another name and is the artist's; a linked one keeps its own.
+    What an artist edited or put there under this name comes back untouched. An outdated datablock of ours, which may be
+    edited, gets another name and is the artist's; a linked one keeps its own.
     """
     found = collection.get((name, None)) or collection.get(name)
     if found is not None:
@@ -144,7 +128,6 @@ class Graph:
 
     Parameters
     ----------
-    tree : bpy.types.NodeTree
     fresh : bool
         Whether it is emptied first.
     """
@@ -318,7 +301,7 @@ def node_group(
     build: Callable[[Graph, dict[str, Term]], dict[str, Any]],
     kind: str = "Shader",
 ) -> bpy.types.NodeTree:
-    """A group of shader nodes, or of ``'Geometry'`` nodes, as `get_or_create` finds or makes it.
+    """A group of shader nodes, or of ``'Geometry'`` nodes, as `_get_or_create` finds or makes it.
 
     Parameters
     ----------
@@ -347,11 +330,11 @@ def node_group(
         graph.arrange()
 
     groups = bpy.data.node_groups
-    return get_or_create(groups, name, version, lambda name: groups.new(name, f"{kind}NodeTree"), fill)
+    return _get_or_create(groups, name, version, lambda name: groups.new(name, f"{kind}NodeTree"), fill)
 
 
 def surface_material(name: str, version: int, build: Callable[[Graph, bpy.types.Material], None]) -> bpy.types.Material:
-    """A material with nodes, as `get_or_create` finds or makes it; `build` may change its viewport color."""
+    """A material with nodes, as `_get_or_create` finds or makes it; `build` may change its viewport color."""
 
     def fill(made: bpy.types.Material) -> None:
         made.diffuse_color = LEAF_GREEN
@@ -359,4 +342,4 @@ def surface_material(name: str, version: int, build: Callable[[Graph, bpy.types.
         build(graph, made)
         graph.arrange()
 
-    return get_or_create(bpy.data.materials, name, version, bpy.data.materials.new, fill)
+    return _get_or_create(bpy.data.materials, name, version, bpy.data.materials.new, fill)

@@ -77,7 +77,7 @@ def add_snow(material: bpy.types.Material, mark: bool = False) -> bool:
         surface = output.inputs["Surface"]
         if not surface.is_linked or _is_snow(surface.links[0].from_node):
             continue
-        node = _group_node(tree, snow_group(), output, mark)
+        node = _group_node(tree, _snow_group(), output, mark)
         if material.name in _PROXIES:
             node.inputs["Twigs"].default_value = 1.0
         _put_between(tree, surface, node.inputs["Shader"], node.outputs["Shader"])
@@ -85,15 +85,11 @@ def add_snow(material: bpy.types.Material, mark: bool = False) -> bool:
     return added
 
 
-def snow_group() -> bpy.types.NodeTree:
-    """The group "TetFlora Snow".
+def _snow_group() -> bpy.types.NodeTree:
+    """The group "TetFlora Snow". The side of a sheet that faces up is white where its output Cover is 1.
 
-    Returns
-    -------
-    bpy.types.NodeTree
-        Inputs Shader, Carry, Snow Color, Twigs; outputs Shader and Cover. The side of a sheet that faces up is white
-        where Cover is 1. From below, a leaf that lets light through is darker by what the snow keeps from it. Leaves of
-        a cluster shade each other's snow, as they do each other (`optics.recollision_albedo`).
+    From below, a leaf that lets light through is darker by what the snow keeps from it. Leaves of a cluster shade each
+    other's snow, as they do each other (`optics.recollision_albedo`).
     """
     inputs = (
         ("Shader", 'Shader'),

@@ -132,8 +132,6 @@ def _build(graph: Graph) -> None:
     graph.node("ShaderNodeOutputMaterial", {"Surface": surface})
 
 
-def _named(
-    graph: Graph, name: str, kind: str, inputs: dict[str, Any] | None = None, **settings: Any
-) -> dict[str, Term]:
+def _named(graph: Graph, name: str, kind: str, given: dict[str, Any] | None = None, **settings: Any) -> dict[str, Term]:
     """Outputs of a node by which the soil is brought up to date later."""
-    return graph.outputs(kind, inputs, name=name, label=name, **settings)
+    return graph.outputs(kind, given, name=name, label=name, **settings)

@@ -30,19 +30,12 @@ _MOST_BYTES = 4_000_000
 
 
 def write_asset_library(folder: Path) -> tuple[Path, int]:
-    """Write a .blend with a plant of each species of the catalog, marked as assets, over an earlier one.
+    """Write a .blend with a plant of each species of the catalog, marked as assets: its path, and how many there are.
 
     Parameters
     ----------
     folder : Path
-        Made if there is none. Blender's file of asset catalogs there gets a line for TetFlora.
-
-    Returns
-    -------
-    path : Path
-        The .blend.
-    plants : int
-        Number of assets.
+        Made if there is none; an earlier file gives way. Blender's file of asset catalogs gets a line for TetFlora.
 
     Raises
     ------

@@ -33,14 +33,8 @@ _SAME = 0.1  # radii within which a dab that removes nothing adds nothing to the
 _PLACE = 0.05  # meters around a plant that was removed, where no other stands
 
 
-def brush_of(scene: bpy.types.Scene, pressure: float = 1.0) -> tuple[Brush, tuple[str, ...]]:
-    """The scene's brush as the engine takes it, and the species that its weights refer to.
-
-    Raises
-    ------
-    SceneError
-        No species has a weight above 0, a setting is beyond its limits, or the brush is too wide for its density.
-    """
+def _brush_of(scene: bpy.types.Scene, pressure: float = 1.0) -> tuple[Brush, tuple[str, ...]]:
+    """The scene's brush as the engine takes it, and the species that its weights refer to; checked."""
     settings = scene.tetflora.brush
     check_limits(settings, "Brush")
     mix = distances.painted_weights(scene)
@@ -73,9 +67,8 @@ class Standing:
         self.fields = fields_of(found)
         places = [np.array([o.matrix_world.translation for o in self.objects], np.float64).reshape(-1, 3)]
         source, number = [np.full(len(self.objects), _OBJECTS)], [np.arange(len(self.objects))]
-        removable = [
-            np.array([o.library is None and o.override_library is None and o.visible_get() for o in self.objects], bool)
-        ]
+        free = [o.library is None and o.override_library is None and o.visible_get() for o in self.objects]
+        removable = [np.array(free, bool)]
         for index, field in enumerate(self.fields):
             own = plant_objects.editable(field)
             if own:
@@ -145,7 +138,7 @@ class Stroke:
         self.scene, self.mode = scene, mode
         self.changed = False  # whether a flush has changed the scene
         self._data = JobData("Paint Plants", scene, depsgraph)
-        _, painted = brush_of(scene)  # reports wrong settings before anything changes
+        _, painted = _brush_of(scene)  # reports wrong settings before anything changes
         measure_all(scene, depsgraph, painted)
         # Moss neither counts for the density of trees nor keeps them away.
         self.standing = Standing(scene, depsgraph, covers=mode == 'ERASE')
@@ -163,7 +156,7 @@ class Stroke:
     def dab(self, center: Sequence[float], pressure: float = 1.0) -> int:
         """Do what the brush does at a place on the ground (3 floats); how many plants that adds or removes."""
         with self._data.watched():
-            brush, _ = brush_of(self.scene, pressure)
+            brush, _ = _brush_of(self.scene, pressure)
             dab, self.dabs = self.dabs, self.dabs + 1
             if self.mode == 'PAINT':
                 return self._paint(brush, center, dab)
@@ -228,7 +221,7 @@ class Stroke:
             self._taken, self._cleared, self._weak = {}, [], False
 
     def _make(self, places: Floats, keys: Keys) -> None:
-        brush, species = brush_of(self.scene)
+        brush, species = _brush_of(self.scene)
         placement = Placement(position=places, wanted=len(keys), **strokes.individuals(brush, keys))
         standing = self.standing
         store, number = self.scene.tetflora.brush.store, len(standing.objects) + len(keys)

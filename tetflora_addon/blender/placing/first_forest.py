@@ -224,10 +224,8 @@ def _cover(scene: bpy.types.Scene, ground: bpy.types.Object) -> None:
     """Cover the ground beside the path; the population of the cover is not the active one."""
     layer = scene.view_layers[0]
     layer.update()
-    steps = cover_steps(
-        scene, layer.depsgraph, scene.tetflora.populate, grounds=[ground], masks={"vertex_group": OFF_PATH}
-    )
-    run_to_end(steps)
+    masks = {"vertex_group": OFF_PATH}
+    run_to_end(cover_steps(scene, layer.depsgraph, scene.tetflora.populate, grounds=[ground], masks=masks))
     tread(ground.material_slots[0].material)
     scene.tetflora.layers_index = -1  # Populate begins with settings for a new one
 

@@ -152,8 +152,6 @@ def drop_steps(data: JobData, plants: Sequence[Object], fields: Sequence[Object]
 
     Parameters
     ----------
-    plants : sequence of bpy.types.Object
-        Plants that are objects.
     fields : sequence of bpy.types.Object
         Whose points are plants, all `plant_objects.editable`.
 

@@ -84,7 +84,7 @@ def add_plant(
 
 
 def add_plants_steps(
-    scene: Scene, placement: Placement, species: Sequence[str], collection: Home = None, ages: Floats | None = None
+    scene: Scene, placement: Placement, species: Sequence[str], home: Home = None, ages: Floats | None = None
 ) -> Generator[list[Object], object, list[Object]]:
     """Make the empties of a placement.
 
@@ -92,8 +92,6 @@ def add_plants_steps(
     ----------
     species : sequence of str
         Identifiers that ``placement.species`` refers to.
-    collection : bpy.types.Collection, optional
-        Where they go; the scene's collection for plants if not given.
     ages : (n,) float, optional
         Years; all are full-grown if not given.
 
@@ -114,7 +112,7 @@ def add_plants_steps(
     if len(tilted):
         angles[tilted] = [Quaternion(q).to_euler() for q in placement.rotation[tilted].tolist()]
     rows = (placement.position, angles, placement.scale, placement.species, placement.seed)
-    return _empties_steps(scene, rows, species, [None] * len(species), collection, ages)
+    return _empties_steps(scene, rows, species, [None] * len(species), home, ages)
 
 
 def _empties_steps(
@@ -122,13 +120,13 @@ def _empties_steps(
     rows: Sequence[np.ndarray],
     species: Sequence[str],
     forms: Sequence[Object | None],
-    collection: Home = None,
+    home: Home = None,
     ages: Floats | None = None,
 ) -> Generator[list[Object], object, list[Object]]:
     """One empty for each row of places, XYZ Euler angles, scales, numbers of kinds and seeds."""
     known = catalog()
     names = _numbered([known[s].name if s in known else s for s in species], rows[3])
-    target = (collection or plant_collection(scene)).objects
+    target = (home or plant_collection(scene)).objects
     new = bpy.data.objects.new
     made: list = [None] * len(names)
     kinds, seeds = rows[3].tolist(), rows[4].tolist()
@@ -185,7 +183,7 @@ def _numbered(names: Sequence[str], kinds: np.ndarray) -> list[str]:
 
 
 def add_field(
-    scene: Scene, placement: Placement, species: Sequence[str], collection: Home = None, ages: Floats | None = None
+    scene: Scene, placement: Placement, species: Sequence[str], home: Home = None, ages: Floats | None = None
 ) -> Object:
     """Make one field of the plants of a placement.
 
@@ -193,22 +191,15 @@ def add_field(
     ----------
     species : sequence of str
         Identifiers that ``placement.species`` refers to.
-    collection : bpy.types.Collection, optional
-        Where it goes; the scene's collection for plants if not given.
     ages : (n,) float, optional
         Years; all are full-grown if not given.
     """
     rows = (placement.position, placement.rotation, placement.scale, placement.species, placement.seed)
-    return link_field(scene, fields.write_field(FIELD, *rows, species, ages=ages), collection)
+    return link_field(scene, fields.write_field(FIELD, *rows, species, ages=ages), home)
 
 
-def field_from_plants(scene: Scene, depsgraph: Depsgraph, plants: Iterable[Object], collection: Home = None) -> Object:
+def field_from_plants(scene: Scene, depsgraph: Depsgraph, plants: Iterable[Object], home: Home = None) -> Object:
     """Put a field in place of plants that are objects; the same individuals stand at the same places.
-
-    Parameters
-    ----------
-    collection : bpy.types.Collection, optional
-        Where it goes; the scene's collection for plants if not given.
 
     Raises
     ------
@@ -220,14 +211,12 @@ def field_from_plants(scene: Scene, depsgraph: Depsgraph, plants: Iterable[Objec
     species = [species_of(kind) for kind in read.identifiers]
     forms = [skeleton_object_of(kind) for kind in read.identifiers]
     rows = (read.position, quaternions(read.frame), read.scale, read.species, read.seed)
-    made = link_field(scene, fields.write_field(FIELD, *rows, species, forms, fields.stored_ages(plants)), collection)
+    made = link_field(scene, fields.write_field(FIELD, *rows, species, forms, fields.stored_ages(plants)), home)
     remove_plants(plants)
     return made
 
 
-def plants_from_field(
-    scene: Scene, depsgraph: Depsgraph, field: Object, most: int, collection: Home = None
-) -> list[Object]:
+def plants_from_field(scene: Scene, depsgraph: Depsgraph, field: Object, most: int, home: Home = None) -> list[Object]:
     """Put empties in place of a field; the same individuals stand at the same places.
 
     Recorded sizes become ages and scales; empties have no crown shapes.
@@ -236,8 +225,6 @@ def plants_from_field(
     ----------
     most : int
         Objects that may be made.
-    collection : bpy.types.Collection, optional
-        Where they go; the scene's collection for plants if not given.
 
     Raises
     ------
@@ -255,7 +242,7 @@ def plants_from_field(
     species = [species_of(kind) for kind in read.identifiers]
     forms = [skeleton_object_of(kind) for kind in read.identifiers]
     rows = (read.position, angles, read.scale, read.species, read.seed)
-    made = run_to_end(_empties_steps(scene, rows, species, forms, collection, ages))
+    made = run_to_end(_empties_steps(scene, rows, species, forms, home, ages))
     remove_fields([field])
     return made
 
@@ -281,11 +268,11 @@ def remove_fields(objects: Iterable[Object], tidy: bool = True) -> int:
     return number
 
 
-def link_field(scene: Scene, field: Object, collection: Home = None) -> Object:
+def link_field(scene: Scene, field: Object, home: Home = None) -> Object:
     """Put a field that TetFlora made into a collection; the scene's for plants if not given."""
     field.tetflora.version, field[FIELD_MARK] = VERSION, True
-    (collection or plant_collection(scene)).objects.link(field)
-    if collection is None:
+    (home or plant_collection(scene)).objects.link(field)
+    if home is None:
         note_field(scene, field)
     prepare_scene(scene)
     return field
@@ -390,7 +377,7 @@ def positions(obj: Object) -> Floats:
 def take_points(obj: Object, keep: Mask) -> None:
     """Keep some of a field's points, (n,) bool, with all their attributes."""
     points = {name: (kind, values[keep]) for name, (kind, values) in _points(obj.data).items()}
-    _write(obj, points, int(keep.sum()))
+    write_points(own_mesh(obj), points)
 
 
 def add_points(obj: Object, placement: Placement, species: Sequence[str]) -> None:
@@ -424,14 +411,14 @@ def add_points(obj: Object, placement: Placement, species: Sequence[str]) -> Non
         "seed": placement.seed,
     }
     points, before = _points(obj.data), len(obj.data.vertices)
-    for name, kind in fields.FIELD_ATTRIBUTES.items():
-        if name not in points:
+    for name, kind in {"position": 'FLOAT_VECTOR', **fields.FIELD_ATTRIBUTES}.items():
+        if name not in points:  # of a mesh that never had any point, not even that
             points[name] = (kind, np.full((before, *own[name].shape[1:]), name == "scale", KINDS[kind].dtype))
     joined: Points = {}
     for name, (kind, values) in points.items():
         new = own.get(name, np.zeros((len(placement), *values.shape[1:])))
         joined[name] = (kind, np.concatenate([values, new.astype(values.dtype)]))
-    _write(obj, joined, before + len(placement))
+    write_points(own_mesh(obj), joined)
 
 
 def assign_field_species(obj: Object, identifier: str) -> bool:
@@ -482,18 +469,14 @@ def _join_equal_kinds(obj: Object) -> None:
 
 
 def _points(mesh: Mesh) -> Points:
-    out: Points = {}
-    for attribute in mesh.attributes:
-        if attribute.domain != 'POINT' or attribute.is_internal:
-            continue
-        out[attribute.name] = (attribute.data_type, values_of(attribute))
-    return out
+    own = (one for one in mesh.attributes if one.domain == 'POINT' and not one.is_internal)
+    return {one.name: (one.data_type, values_of(one)) for one in own}
 
 
-def _write(obj: Object, points: Points, number: int) -> None:
-    mesh = own_mesh(obj)
+def write_points(mesh: Mesh, points: Points) -> None:
+    """Give a mesh points alone, by the types and values (n) of their attributes."""
     mesh.clear_geometry()
-    mesh.vertices.add(number)
+    mesh.vertices.add(len(points["position"][1]))
     for name, (kind, values) in points.items():
         write(mesh, name, values, data_type=kind)
     mesh.update()

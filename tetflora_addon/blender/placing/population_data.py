@@ -12,6 +12,7 @@ from typing import Any
 
 import bpy
 import numpy as np
+from bpy.types import Property, PropertyGroup, Scene
 
 from ...errors import NAME, quoted, readable
 from ...files import IDENTIFIER_RULE, is_identifier
@@ -34,12 +35,12 @@ def population_data(population: TetFloraLayer) -> dict[str, Any]:
     return data | settings_data(population, [p.identifier for p in simple_settings(population)])
 
 
-def simple_settings(group: type[bpy.types.PropertyGroup] | bpy.types.PropertyGroup) -> list[bpy.types.Property]:
+def simple_settings(group: type[PropertyGroup] | PropertyGroup) -> list[Property]:
     """Settings that are single values."""
     return [p for p in settings_of(group) if p.type != 'COLLECTION']
 
 
-def settings_data(group: bpy.types.PropertyGroup, names: Iterable[str], always: Container[str] = ()) -> dict[str, Any]:
+def settings_data(group: PropertyGroup, names: Iterable[str], always: Container[str] = ()) -> dict[str, Any]:
     """Settings of a group as files have them: those that differ from their defaults, and some of them always."""
     data = {}
     for name in names:
@@ -53,7 +54,7 @@ def settings_data(group: bpy.types.PropertyGroup, names: Iterable[str], always: 
     return data
 
 
-def set_setting(group: bpy.types.PropertyGroup, name: str, value: Any) -> None:
+def set_setting(group: PropertyGroup, name: str, value: Any) -> None:
     """Give a group a setting as a checked file has it; none for an image or a collection that is not there."""
     prop = group.bl_rna.properties[name]
     if prop.type == 'POINTER' and value is not None:
@@ -63,15 +64,7 @@ def set_setting(group: bpy.types.PropertyGroup, name: str, value: Any) -> None:
 
 
 def check_population(where: str, entry: Any) -> None:
-    """Refuse what cannot be a population with a `ValueError`.
-
-    Parameters
-    ----------
-    where : str
-        What messages call it.
-    entry : Any
-        Decoded.
-    """
+    """Refuse what cannot be a population with a `ValueError`, which calls it as ``where`` says."""
     simple = {p.identifier for p in simple_settings(TetFloraLayer)}
     check_keys(where, entry, {"name"}, {"kind", "name", "grounds", "species", *simple})
     check_text(f'{where}: "name"', entry["name"])
@@ -81,7 +74,7 @@ def check_population(where: str, entry: Any) -> None:
     check_settings(where, entry, TetFloraLayer, simple)
 
 
-def check_species(where: str, parts: Any, kind: type[bpy.types.PropertyGroup], names: Collection[str]) -> None:
+def check_species(where: str, parts: Any, kind: type[PropertyGroup], names: Collection[str]) -> None:
     """Refuse what cannot be the list of species of a layer with a `ValueError`."""
     for index, part in enumerate(list_of(f'{where}: "species"', parts), 1):
         here = f"{where}: species {index}"
@@ -92,16 +85,14 @@ def check_species(where: str, parts: Any, kind: type[bpy.types.PropertyGroup], n
                 raise ValueError(f'{here}: "{key}" is {quoted(part[key])}; use only {IDENTIFIER_RULE}')
 
 
-def check_settings(
-    where: str, entry: Mapping[str, Any], kind: type[bpy.types.PropertyGroup], names: Iterable[str]
-) -> None:
+def check_settings(where: str, entry: Mapping[str, Any], kind: type[PropertyGroup], names: Iterable[str]) -> None:
     """Refuse values of settings that a group could not have with a `ValueError`."""
     for key in names:
         if key in entry:
             check_value(f'{where}: "{key}"', kind.bl_rna.properties[key], entry[key])
 
 
-def fill_population(population: TetFloraLayer, entry: dict[str, Any], scene: bpy.types.Scene) -> None:
+def fill_population(population: TetFloraLayer, entry: dict[str, Any], scene: Scene) -> None:
     """Give a new population what a checked entry says, as far as the scene has it, and defaults for the rest."""
     for prop in simple_settings(population):
         name = prop.identifier
@@ -117,7 +108,7 @@ def fill_population(population: TetFloraLayer, entry: dict[str, Any], scene: bpy
     set_grounds(population, [obj for obj in found if obj is not None and obj.type == 'MESH'])
 
 
-def check_value(where: str, prop: bpy.types.Property, value: Any) -> None:
+def check_value(where: str, prop: Property, value: Any) -> None:
     """Refuse a value that a property could not have with a `ValueError`."""
     if prop.type == 'POINTER':
         if value is not None:
@@ -135,7 +126,7 @@ def check_value(where: str, prop: bpy.types.Property, value: Any) -> None:
         _check_number(where, prop, value)
 
 
-def _check_number(where: str, prop: bpy.types.Property, value: Any) -> None:
+def _check_number(where: str, prop: Property, value: Any) -> None:
     whole = prop.type == 'INT'
     if isinstance(value, bool) or not isinstance(value, int if whole else int | float):
         raise ValueError(f"{where} is {quoted(value)}; it must be a {'whole ' if whole else ''}number")
@@ -179,7 +170,7 @@ def check_text(where: str, value: Any) -> None:
         )
 
 
-def value_for(prop: bpy.types.Property, value: Any) -> Any:
+def value_for(prop: Property, value: Any) -> Any:
     """A stored value as files have it; numbers in as few digits as give the same single-precision number back."""
     if prop.type != 'FLOAT':
         return value

@@ -69,8 +69,6 @@ def add_population(scene: Scene, grounds: Iterable[Object] = (), name: str = NAM
 
     Parameters
     ----------
-    grounds : iterable of bpy.types.Object
-        Meshes to grow on.
     name : str
         A number is added if another population has it.
     """

@@ -96,14 +96,8 @@ def zone_values(scene: Scene, population: PropertyGroup) -> list[Any]:
     return values if len(values) > 1 or is_limited(biome) else []
 
 
-def read_zones(depsgraph: Depsgraph, population: PropertyGroup, grounds: Sequence[Object]) -> tuple[Zone, ...]:
-    """Zones that limit a population on its grounds: its biome's, and the inverse of those to which that gives way.
-
-    Raises
-    ------
-    SceneError
-        A mask or a path cannot be read, as the message says.
-    """
+def _read_zones(depsgraph: Depsgraph, population: PropertyGroup, grounds: Sequence[Object]) -> tuple[Zone, ...]:
+    """Zones that limit a population on its grounds: its biome's, and the inverse of those to which that gives way."""
     biome = biome_of(depsgraph.scene, population)
     if biome is None:
         return ()
@@ -115,9 +109,12 @@ def read_zones(depsgraph: Depsgraph, population: PropertyGroup, grounds: Sequenc
 def zoned(depsgraph: Depsgraph, owner: PropertyGroup, grounds: Sequence[Object], ground: Terrain) -> Terrain:
     """A ground with the zones of a layer, a population or a stand, in its weights: as they are at the corners.
 
-    Errors are those of `read_zones`.
+    Raises
+    ------
+    SceneError
+        A mask or a path cannot be read, as the message says.
     """
-    zones = read_zones(depsgraph, owner, grounds)
+    zones = _read_zones(depsgraph, owner, grounds)
     if not zones:
         return ground
     corners, count = ground.triangles, len(ground.triangles)
@@ -185,10 +182,7 @@ def digest(values: list[Any]) -> str:
 
 @lru_cache(maxsize=1)
 def _defaults(kind: type[PropertyGroup]) -> tuple[tuple[str, Any], ...]:
-    """Names and defaults of settings that are single values; kept, because panels ask at every redraw.
-
-    Of the distance counts what it is, and not where it comes from.
-    """
+    """Names and defaults of settings that are single values, with the distance itself; panels ask at every redraw."""
     simple = [p for p in settings_of(kind) if p.type != 'COLLECTION' and p.identifier != "distance_by_species"]
     return tuple((p.identifier, None if p.type == 'POINTER' else p.default) for p in simple)
 
@@ -423,8 +417,8 @@ def read_search(
     if above is None and is_cover(population):
         above = canopy_of(scene, depsgraph)
     suits = read_suits(population, ground.triangles, species, above)
-    present = standing(depsgraph, own, species)
-    zones = read_zones(depsgraph, population, grounds)
+    present = _standing(depsgraph, own, species)
+    zones = _read_zones(depsgraph, population, grounds)
     erased = (  # circles, as lines of one point
         Path(center[None], stroke[0])
         for stroke in _strokes(population)
@@ -433,16 +427,8 @@ def read_search(
     return Search(ground, rules, present, suits, tuple(erased), species, zones)
 
 
-def standing(depsgraph: Depsgraph, without: Collection[Object], species: Sequence[str]) -> tuple[Floats, Integers32]:
-    """Places (m, 3) and species (m,) of the plants of the scene, those that are objects and those of fields.
-
-    Parameters
-    ----------
-    without : set of bpy.types.Object
-        Plants and fields that do not count.
-    species : sequence of str
-        Identifiers that the result counts through; others have -1.
-    """
+def _standing(depsgraph: Depsgraph, without: Collection[Object], species: Sequence[str]) -> tuple[Floats, Integers32]:
+    """Places (m, 3) and species (m,) of plants of the scene, objects and fields; -1 for species that are not given."""
     numbers = {identifier: number for number, identifier in enumerate(species)}
     # What covers the ground keeps nobody away.
     objects = [o for o in not_of_covers(depsgraph.scene) if o not in without]

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import bpy
 import numpy as np
+from bpy.types import Collection, Curves, Depsgraph, Image, Mesh, Object, Spline
 
 from ...arrays import Floats, Floats32
 from ...errors import SceneError
@@ -24,7 +25,7 @@ HALF_WIDTH = "tetflora_half_width"
 MASKS = (*("vertex_group", "image", "uv_layer", "invert_group", "invert_image"), *("areas", "paths", "path_distance"))
 
 
-def grid_mesh(name: str, points: Floats) -> bpy.types.Mesh:
+def grid_mesh(name: str, points: Floats) -> Mesh:
     """A smooth mesh of the quadrilaterals between rows of points (rows, columns, 3)."""
     rows, columns = points.shape[:2]
     first = (np.arange(rows - 1)[:, None] * columns + np.arange(columns - 1)).reshape(-1)
@@ -34,7 +35,7 @@ def grid_mesh(name: str, points: Floats) -> bpy.types.Mesh:
     return mesh
 
 
-def ground_form(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph | None) -> str:
+def ground_form(obj: Object, depsgraph: Depsgraph | None) -> str:
     """Numbers that tell where a ground lies and how it is formed, for `lies_elsewhere`; none of one that is not shown.
 
     How far it reaches, meters; its vertices; its corners; and three means of places, meters, times the root of the
@@ -71,15 +72,11 @@ class Line:
     half_width: float  # width that its bevel adds to each side, meters
 
 
-def lines_of(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> list[Line]:
+def _lines_of(obj: Object, depsgraph: Depsgraph) -> list[Line]:
     """Lines of a curve object, as smooth as it is drawn; none of objects of other types.
 
-    Modifiers count, except where a curve has a bevel, an extrusion or a fill: then its control points are read.
-
-    Raises
-    ------
-    SceneError
-        A NURBS curve with a bevel, an extrusion or a fill.
+    Modifiers count, except where a curve has a bevel, an extrusion or a fill: then its control points are read, but of
+    NURBS, which are an error.
     """
     evaluated, matrix, half_width = obj.evaluated_get(depsgraph), world_matrix(obj, depsgraph), 0.0
     if obj.type == 'CURVE':
@@ -99,7 +96,7 @@ def lines_of(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> list[Line
     return [Line(points, cyclic, half_width) for points, cyclic in lines]
 
 
-def _from_edges(evaluated: bpy.types.Object) -> list[tuple[Floats, bool]] | None:
+def _from_edges(evaluated: Object) -> list[tuple[Floats, bool]] | None:
     """Splines of a curve that evaluates to nothing but edges; None if it has faces."""
     with mesh_of(evaluated) as mesh:
         if mesh is None or len(mesh.polygons):
@@ -118,7 +115,7 @@ def _from_edges(evaluated: bpy.types.Object) -> list[tuple[Floats, bool]] | None
     return [(positions[a:b], (a, b - 1) in closing) for a, b in zip(starts.tolist(), stops.tolist(), strict=True)]
 
 
-def _from_spline(spline: bpy.types.Spline, obj: bpy.types.Object) -> tuple[Floats, bool]:
+def _from_spline(spline: Spline, obj: Object) -> tuple[Floats, bool]:
     if spline.type == 'NURBS':
         raise SceneError(
             f'The NURBS curve "{obj.name}" has a bevel, extrusion or fill; remove it, or change its type to Bézier'
@@ -126,7 +123,7 @@ def _from_spline(spline: bpy.types.Spline, obj: bpy.types.Object) -> tuple[Float
     return spline_chain(spline).points[:, :3], spline.use_cyclic_u
 
 
-def _from_curves(curves: bpy.types.Curves) -> list[tuple[Floats, bool]]:
+def _from_curves(curves: Curves) -> list[tuple[Floats, bool]]:
     """Lines through the points of hair curves."""
     if not len(curves.curves):
         return []
@@ -138,24 +135,22 @@ def _from_curves(curves: bpy.types.Curves) -> list[tuple[Floats, bool]]:
 
 
 def read_ground(
-    objects: Iterable[bpy.types.Object],
-    depsgraph: bpy.types.Depsgraph,
+    objects: Iterable[Object],
+    depsgraph: Depsgraph,
     *,
     vertex_group: str = "",
-    image: bpy.types.Image | None = None,
+    image: Image | None = None,
     uv_layer: str = "",
     invert_group: bool = False,
     invert_image: bool = False,
-    areas: bpy.types.Collection | None = None,
-    paths: bpy.types.Collection | None = None,
+    areas: Collection | None = None,
+    paths: Collection | None = None,
     path_distance: float = 0.0,
 ) -> Terrain:
     """The ground as the engine takes it, modifiers applied, in world space.
 
     Parameters
     ----------
-    objects : iterable of bpy.types.Object
-        Meshes.
     vertex_group : str
         Group whose weights define how suitable the ground is; every mesh needs it, or a float attribute of its name.
     image : bpy.types.Image, optional
@@ -203,16 +198,14 @@ def _path(line: Line, distance: float) -> Path:
     return Path(points, distance + line.half_width)
 
 
-def lines_within(paths: bpy.types.Collection, depsgraph: bpy.types.Depsgraph) -> tuple[Floats, ...]:
+def lines_within(paths: Collection, depsgraph: Depsgraph) -> tuple[Floats, ...]:
     """Curves of a collection of paths as lines on the map, (k, 2) each; closed ones end where they begin."""
     return tuple(_path(line, 0.0).points for line in _lines(paths, depsgraph, "Paths"))
 
 
-def _lines(
-    collection: bpy.types.Collection, depsgraph: bpy.types.Depsgraph, setting: str, closed: bool = False
-) -> list[Line]:
+def _lines(collection: Collection, depsgraph: Depsgraph, setting: str, closed: bool = False) -> list[Line]:
     """Curves of a collection, those that are closed or all of them; there is at least one."""
-    found = [line for obj in objects_within(collection) for line in lines_of(obj, depsgraph)]
+    found = [line for obj in objects_within(collection) for line in _lines_of(obj, depsgraph)]
     if not found:
         raise SceneError(f'The {setting} collection "{collection.name}" has no curves; add one, or clear {setting}')
     if not closed:
@@ -227,7 +220,7 @@ def _lines(
 
 
 def _read_mesh(
-    obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph, group: str, uv_layer: str, with_uv: bool
+    obj: Object, depsgraph: Depsgraph, group: str, uv_layer: str, with_uv: bool
 ) -> tuple[Floats, Floats32 | None, Floats | None, Floats]:
     """Triangles in world space, weights and UV at their corners where asked for, and the border."""
     if obj.type != 'MESH':
@@ -249,7 +242,7 @@ def _read_mesh(
     return positions[vertices], weight, uv, positions[ends[faces == 1]]
 
 
-def _weights(evaluated: bpy.types.Object, mesh: bpy.types.Mesh, group: str, name: str) -> Floats:
+def _weights(evaluated: Object, mesh: Mesh, group: str, name: str) -> Floats:
     """Weight of each vertex, (v,)."""
     attribute = mesh.attributes.get(group)
     # Geometry nodes turn vertex groups into attributes.
@@ -264,7 +257,7 @@ def _weights(evaluated: bpy.types.Object, mesh: bpy.types.Mesh, group: str, name
     return np.fromiter(each, np.float64, len(mesh.vertices))
 
 
-def _uv(mesh: bpy.types.Mesh, layer: str, name: str) -> Floats:
+def _uv(mesh: Mesh, layer: str, name: str) -> Floats:
     """UV of each corner, (c, 2)."""
     if layer and layer not in mesh.uv_layers:
         raise SceneError(f'"{name}" has no UV map "{layer}"; add it, or clear UV Map')
@@ -274,7 +267,7 @@ def _uv(mesh: bpy.types.Mesh, layer: str, name: str) -> Floats:
     return read(mesh, found.name).astype(np.float64)
 
 
-def _luminance(image: bpy.types.Image) -> Floats32:
+def _luminance(image: Image) -> Floats32:
     """Gray values of an image, (h, w), the first row at the bottom."""
     if image.source == 'TILED':
         raise SceneError(f'The image "{image.name}" has UDIM tiles, which layers do not support; use a single image')

@@ -47,14 +47,8 @@ def is_switched(obj: Object) -> bool:
     return any(curve.data_path in _FLAGS for curve in curves)
 
 
-def hide_linked(scene: Scene, purpose: str, originals: Sequence[Object]) -> None:
-    """Hide linked objects too.
-
-    Raises
-    ------
-    SceneError
-        It cannot hide one: names it and says what to do. Nothing is hidden then.
-    """
+def _hide_linked(scene: Scene, purpose: str, originals: Sequence[Object]) -> None:
+    """Hide linked objects too, or none where one cannot be: then the error names it and says what to do."""
     hidden, homes = linked_hidden(scene, purpose), _collections(scene)
     wanted = list(dict.fromkeys([*hidden, *originals]))
     if len(wanted) == len(hidden):
@@ -96,7 +90,7 @@ def hide_linked(scene: Scene, purpose: str, originals: Sequence[Object]) -> None
 
 
 def show_linked(scene: Scene, purpose: str) -> None:
-    """Show what `hide_linked` hid, as it was."""
+    """Show what `_hide_linked` hid, as it was."""
     record = scene.get(HIDDEN_LINKED[purpose])
     if record is None:
         return
@@ -181,7 +175,7 @@ def hide_originals(scene: Scene, purpose: str, originals: Sequence[Object]) -> N
         One is linked in such a way that it cannot be hidden: see `check_linked`. None is hidden then.
     """
     apart = [original for original in originals if original.library is not None or is_switched(original)]
-    hide_linked(scene, purpose, apart)
+    _hide_linked(scene, purpose, apart)
     for original in originals:
         if original in apart:
             continue
@@ -367,7 +361,7 @@ def restore_marks(lifted: dict[tuple, str | list]) -> None:
         if linked:
             scene, objects = bpy.data.scenes.get((name, None)), [object_named(key) for key in mark]
             if scene is not None:
-                hide_linked(scene, purpose, [obj for obj in objects if obj is not None])
+                _hide_linked(scene, purpose, [obj for obj in objects if obj is not None])
             continue
         original = bpy.data.objects.get((name, None))
         if original is not None:
@@ -457,7 +451,7 @@ def originals_shown(scene: Scene, depsgraph: Depsgraph | None = None) -> Iterato
         for o, flags in before.items():
             o.hide_render, o.hide_viewport = flags
         for home, purpose, every in reversed(linked):
-            hide_linked(home, purpose, every)
+            _hide_linked(home, purpose, every)
 
     try:
         in_main_thread(show)

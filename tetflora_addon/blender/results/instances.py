@@ -50,12 +50,10 @@ Source = Object | Collection
 def add_instances(
     results: Results, name: str, source: Source, matrices: Floats, ids: Integers32, like: Object | None = None
 ) -> Object:
-    """Add one object that shows many instances of an object or a collection.
+    """Add one object to the result collection that shows many instances of an object or a collection.
 
     Parameters
     ----------
-    name : str
-        Of the new object, ending in a number.
     source : bpy.types.Object or bpy.types.Collection
         The artist's own, or what `carrier_of` returned. Visible or not, in the scene or not, of this file or not.
     matrices : (n, 4, 4) float64
@@ -65,10 +63,6 @@ def add_instances(
     like : bpy.types.Object, optional
         Object that shows the instances in the artist's scene: see `look_like`.
 
-    Returns
-    -------
-    bpy.types.Object
-        In the result collection.
     """
     name = results.name_for(name)
     made = _instancer(name, source, matrices, ids)
@@ -115,8 +109,6 @@ def add_cluster(results: Results, stem: str, number: int, mesh: Mesh, like: Obje
 
     Parameters
     ----------
-    stem : str
-        Name of the asset.
     number : int
         Of the cluster; the name ends in it.
     mesh : bpy.types.Mesh
@@ -181,9 +173,7 @@ def _held(results: Results, name: str, source: Source, matrices: NDArray[np.floa
     return made
 
 
-def _instancer(
-    name: str, source: Source, matrices: NDArray[np.floating], ids: Integers, pick: Integers32 | None = None
-) -> Object:
+def _instancer(name: str, source: Source, matrices: NDArray, ids: Integers, pick: Integers32 | None = None) -> Object:
     """An object in no collection whose nodes show instances of a source, or of objects picked from a collection."""
     kind = 'COLLECTION' if isinstance(source, Collection) else 'OBJECT'
     kind = kind if pick is None else 'CHILDREN'
@@ -211,10 +201,8 @@ def _group(kind: str) -> NodeTree:
             inputs = {"Object": given[_SOURCE], "As Instance": True}
             shown = graph.outputs("GeometryNodeObjectInfo", inputs, transform_space='ORIGINAL')["Geometry"]
         else:
-            inputs = {
-                "Collection": given[_SOURCE],
-                **dict.fromkeys(("Separate Children", "Reset Children"), kind == 'CHILDREN'),
-            }
+            apart = dict.fromkeys(("Separate Children", "Reset Children"), kind == 'CHILDREN')
+            inputs = {"Collection": given[_SOURCE], **apart}
             shown = graph.outputs("GeometryNodeCollectionInfo", inputs, transform_space='ORIGINAL')["Instances"]
         # Points lose their matrices, or instances would keep them as well. Only here: to remove them from instances, or
         # to do anything to what these show, would turn objects into plain geometry.
@@ -259,12 +247,8 @@ def add_stand_in(results: Results, name: str, original: Object, depsgraph: Depsg
 
     Parameters
     ----------
-    name : str
-        Of the new object, ending in a number.
     original : bpy.types.Object
         Of this file or of a library; shown or hidden.
-    depsgraph : bpy.types.Depsgraph
-        In which it is shown.
     """
     if not shows_itself(original, depsgraph):
         return None

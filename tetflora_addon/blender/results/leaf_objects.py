@@ -38,46 +38,28 @@ _FEW, _APART, _FLAT = 10, 5.4, 0.012
 _DIRECTIONS = tau * np.arange(48) / 48
 
 
-def species_leaf_material(species: Species, kind: str) -> bpy.types.Material:
-    """TetFlora's own material for the leaves or blossoms of a species.
-
-    Parameters
-    ----------
-    species : Species
-        Resolved or not.
-    kind : str
-        One of `LEAF_KINDS`.
-    """
+def _species_leaf_material(species: Species, kind: str) -> bpy.types.Material:
+    """TetFlora's own material for the leaves or blossoms of a species, resolved or not."""
     forms = species.forms(kind)
     model = forms[0] if isinstance(forms[0], LeafModel) else None
     through = species.leaf_transmission if kind == "leaf" else species.blossom_transmission
     leaflet = model.shape.length if model is not None and isinstance(model.shape, Compound) else 1.0
     looks = {"leaf_length": leaflet * _length(species, kind)}
-    blade = "pinnate" if model is None else blade_kind(model, through, kind)
+    blade = "pinnate" if model is None else _blade_kind(model, through, kind)
     if model is not None:
         looks |= _venation(model, blade)
     return leaf_material(species.name if kind == "leaf" else f"{species.name} {kind}", blade, **looks)
 
 
-def blade_kind(model: LeafModel, transmission: float, kind: str = "leaf") -> str:
-    """One of `blade.BLADES` for a leaf model, by its outline, else by its UV map: the pattern lies in that.
-
-    Parameters
-    ----------
-    transmission : float
-        Fraction of light that is scattered through the leaf.
-    kind : str
-        One of `LEAF_KINDS`.
-    """
+def _blade_kind(model: LeafModel, transmission: float, kind: str = "leaf") -> str:
+    """One of `blade.BLADES` for a leaf model, by its outline, else by its UV map: the pattern lies in that."""
     if transmission < _THICK or isinstance(model.shape, Needles):
         return "needle" if kind == "leaf" else "plain"
     if kind != "leaf":
         return "petal"
     outline = _outline(model)
-    if outline is not None and not outline.palmate:
-        return _simple(outline.width, outline.lobes > 0)
     if outline is not None:
-        return "palmate"
+        return "palmate" if outline.palmate else _simple(outline.width, outline.lobes > 0)
     width, length = _extent(model)
     if _leaflets(model, length):
         return "plain"
@@ -155,11 +137,6 @@ def leaf_objects(scene: bpy.types.Scene) -> dict[str, bpy.types.Object]:
 def resolved_species(scene: bpy.types.Scene, kind_of_plant: str, depsgraph: bpy.types.Depsgraph) -> Species:
     """A species with polygons and a skeleton in place of the names of objects.
 
-    Parameters
-    ----------
-    kind_of_plant : str
-        See `species.kinds`.
-
     Raises
     ------
     SpeciesError
@@ -219,7 +196,7 @@ def materials_of(scene: bpy.types.Scene, species: Species, kind: str, form: int)
         dead = species.aged is not None and species.bark != species.aged[0].bark
         return [_in_viewports(bark_material(species.name + " dead" * dead, species.bark), species, kind)]
     own = _brought(scene, species.identifier, kind, form)
-    return own if any(own) else [_in_viewports(species_leaf_material(species, kind), species, kind)]
+    return own if any(own) else [_in_viewports(_species_leaf_material(species, kind), species, kind)]
 
 
 def brought_materials(scene: bpy.types.Scene, kind_of_plant: str) -> list[list[str]]:

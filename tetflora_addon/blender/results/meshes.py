@@ -33,7 +33,7 @@ _DOMAINS = ("POINT", "FACE", "CORNER")
 
 
 def write_mesh(name: str, buffers: MeshBuffers, materials: Sequence[bpy.types.Material | None] = ()) -> bpy.types.Mesh:
-    """Make a mesh datablock from buffers.
+    """Make a mesh datablock from buffers, not linked to any object.
 
     Topology is copied, edges included, so that Blender computes nothing; where buffers have none it finds them.
     Positions and indices are written through the mesh's attributes, which are plain memory; the collections
@@ -41,18 +41,9 @@ def write_mesh(name: str, buffers: MeshBuffers, materials: Sequence[bpy.types.Ma
 
     Parameters
     ----------
-    name : str
-        Name of the new datablock; Blender appends a number where it is taken.
     buffers : MeshBuffers
         The mesh, see ``docs/architecture.md``. ``UVMap`` becomes the UV map; an INT attribute ``material_index`` on
         ``'FACE'`` chooses among `materials`.
-    materials : sequence of bpy.types.Material or None
-        Material slots in their order.
-
-    Returns
-    -------
-    bpy.types.Mesh
-        Not linked to any object.
 
     Raises
     ------
@@ -148,13 +139,6 @@ def _check_range(key: str, indices: NDArray, count: int) -> None:
 
 def point_object(name: str, buffers: PointBuffers, material: bpy.types.Material) -> bpy.types.Object:
     """Make an object of points that render as spheres, not linked to any collection.
-
-    Parameters
-    ----------
-    name : str
-        Name of the new datablocks; Blender appends a number where it is taken.
-    material : bpy.types.Material
-        Of all points.
 
     Returns
     -------
@@ -288,9 +272,8 @@ class AssetMeshes:
         self.surface = np.asarray(surface, np.int32)
         self.matrices = np.asarray(matrices, np.float64).reshape(-1, 4, 4)
         rows = self.matrices[:, :3, :3].transpose(0, 2, 1)
-        a, b, c = rows[:, 0], rows[:, 1], rows[:, 2]
         self.mirrored = np.linalg.det(rows) < 0.0
-        turned = np.stack([np.cross(b, c), np.cross(c, a), np.cross(a, b)], axis=1)
+        turned = np.cross(np.roll(rows, -1, axis=1), np.roll(rows, -2, axis=1))
         #: (n, 3, 3): a row vector times this is a normal in the space of the asset, of any length.
         self.cofactors = turned * np.where(self.mirrored, -1.0, 1.0)[:, None, None]
         self.moved = (self.matrices != np.eye(4)).any(axis=(1, 2))
@@ -345,8 +328,6 @@ def cluster_mesh_steps(
 
     Parameters
     ----------
-    name : str
-        Of the mesh.
     part, face : (k,) int32
         Faces of parts, by their number in the mesh of the part's surface.
 

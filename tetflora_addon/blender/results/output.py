@@ -240,13 +240,11 @@ def remove_collection(scene: bpy.types.Scene | None, collection: bpy.types.Colle
 def remove_unused(datablocks: Iterable[bpy.types.ID]) -> int:
     """Remove what results could use, and nothing uses any more; returns the number removed."""
     left, removed = [one for one in datablocks if is_there(one) and is_own(one)], 0
-    while True:
-        unused = [one.users == 0 for one in left]
-        if not any(unused):
-            return removed
-        bpy.data.batch_remove([one for one, gone in zip(left, unused, strict=True) if gone])
-        left = [one for one, gone in zip(left, unused, strict=True) if not gone]
-        removed += sum(unused)
+    while unused := [one for one in left if not one.users]:
+        left = [one for one in left if one.users]
+        bpy.data.batch_remove(unused)
+        removed += len(unused)
+    return removed
 
 
 def remove_made(datablocks: Iterable[bpy.types.ID]) -> None:

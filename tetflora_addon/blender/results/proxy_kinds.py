@@ -21,8 +21,7 @@ from ..materials.microsphere import baked_shell_material, shell_material
 DEFAULT = 'AUTOMATIC'
 #: Fraction of a form's bounces below which the artist is warned.
 FEW = 0.5
-#: Settings of Cycles: the number at which rays end, and the number below which they go on to their ends. Beyond that,
-#: weak light goes on by chance, as noise.
+#: Settings of Cycles: the number at which rays end, and the one beyond which weak light goes on by chance, as noise.
 _SETTINGS = ("transparent_max_bounces", "min_transparent_bounces")
 #: Settings of EEVEE, on while plants are rendered: the sky counts by how much of it the depth buffer leaves open.
 _OCCLUSION = ("use_raytracing", "use_fast_gi")

@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import bpy
 import numpy as np
+from bpy.types import Area, Depsgraph, Region, RenderSettings, Scene, SpaceView3D
 
 from ...arrays import Floats
 from ...camera.camera import Camera
@@ -21,9 +22,7 @@ _NARROW_FISHEYE = math.pi / 4.0
 _LEAST_HALF = 0.1
 
 
-def read_camera(
-    scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, region_only: bool = False, blurred: bool = True
-) -> Camera:
+def read_camera(scene: Scene, depsgraph: Depsgraph, region_only: bool = False, blurred: bool = True) -> Camera:
     """The active camera as it is evaluated now.
 
     ``camera.view_frame`` already knows about lens shift, sensor fit and pixel aspect. A scaled or sheared camera is
@@ -100,7 +99,7 @@ def read_camera(
 
 
 def _region(
-    render: bpy.types.RenderSettings, window: tuple[float, float, float, float], width: int, height: int
+    render: RenderSettings, window: tuple[float, float, float, float], width: int, height: int
 ) -> tuple[tuple[float, float, float, float], int, int]:
     """The window of the render region, in whole pixels, and its size."""
     first_x, last_x = math.floor(render.border_min_x * width), math.ceil(render.border_max_x * width)
@@ -154,7 +153,7 @@ def _panorama(data: bpy.types.Camera, width: int, height: int) -> tuple[tuple[fl
     return (-math.pi, math.pi, -math.pi / 2.0, math.pi / 2.0), 2 * pixels, pixels
 
 
-def _lens(data: bpy.types.Camera, matrix: Floats, depsgraph: bpy.types.Depsgraph) -> tuple[float, float]:
+def _lens(data: bpy.types.Camera, matrix: Floats, depsgraph: Depsgraph) -> tuple[float, float]:
     """Radius of the aperture and distance of focus, meters; a radius of 0 without depth of field.
 
     The lens's diameter is its focal length over the f-stop; for Cycles, that of an orthographic camera is 1 m.
@@ -172,7 +171,7 @@ def _lens(data: bpy.types.Camera, matrix: Floats, depsgraph: bpy.types.Depsgraph
 
 
 def _while_open(
-    scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, camera: Camera, window: tuple[float, float, float, float]
+    scene: Scene, depsgraph: Depsgraph, camera: Camera, window: tuple[float, float, float, float]
 ) -> tuple[Camera, ...]:
     """The camera when the shutter opens and closes, if motion blur is on and it is animated; see `motion`."""
     if not scene.render.use_motion_blur or not moves(scene.camera):
@@ -190,7 +189,7 @@ def _while_open(
     return tuple(found) if moving else ()
 
 
-def _stereo_views(scene: bpy.types.Scene, camera: Camera, depsgraph: bpy.types.Depsgraph) -> tuple[Camera, ...]:
+def _stereo_views(scene: Scene, camera: Camera, depsgraph: Depsgraph) -> tuple[Camera, ...]:
     """Cameras that a scene renders beside its active one; none without stereoscopy.
 
     *Stereo 3D* moves the camera by half of the distance of the eyes to either side (or all of it, by the pivot), and
@@ -222,7 +221,7 @@ def _stereo_views(scene: bpy.types.Scene, camera: Camera, depsgraph: bpy.types.D
     return tuple(found)
 
 
-def _by_suffix(scene: bpy.types.Scene, camera: Camera, depsgraph: bpy.types.Depsgraph) -> tuple[Camera, ...]:
+def _by_suffix(scene: Scene, camera: Camera, depsgraph: Depsgraph) -> tuple[Camera, ...]:
     """Cameras whose names differ from the active one's by the suffixes of the scene's views."""
     suffixes = [view.camera_suffix for view in scene.render.views if view.use and view.camera_suffix]
     name = scene.camera.name
@@ -250,7 +249,7 @@ def timeline_moves() -> bool:
     return any(screen.is_animation_playing or screen.is_scrubbing for screen in screens)
 
 
-def viewports(scene: bpy.types.Scene) -> list[tuple[bpy.types.SpaceView3D, bpy.types.Area]]:
+def viewports(scene: Scene) -> list[tuple[SpaceView3D, Area]]:
     """Viewports that show a scene, in all windows."""
     manager = bpy.context.window_manager
     windows = [window for window in ([] if manager is None else manager.windows) if window.scene == scene]
@@ -258,18 +257,18 @@ def viewports(scene: bpy.types.Scene) -> list[tuple[bpy.types.SpaceView3D, bpy.t
     return [(area.spaces.active, area) for area in areas]
 
 
-def views_of(scene: bpy.types.Scene) -> list[Floats]:
+def views_of(scene: Scene) -> list[Floats]:
     """Matrices (4, 4) from the world to clip space of all viewports that show a scene, as they were last drawn."""
     views = [view for space, _ in viewports(scene) for view in (space.region_quadviews or [space.region_3d])]
     return [np.array(view.perspective_matrix, np.float64) for view in views]
 
 
-def is_rendered(scene: bpy.types.Scene) -> bool:
+def is_rendered(scene: Scene) -> bool:
     """Whether a viewport shows a scene in *Rendered* shading."""
     return any(space.shading.type == 'RENDERED' for space, _ in viewports(scene))
 
 
-def viewport_of(scene: bpy.types.Scene) -> tuple[bpy.types.SpaceView3D, bpy.types.Region] | None:
+def viewport_of(scene: Scene) -> tuple[SpaceView3D, Region] | None:
     """The viewport to refine a scene for: with rendered shading if there is one, with a view of its own, the largest.
 
     None where that one looks through the camera, or where there is no window.
@@ -284,27 +283,20 @@ def viewport_of(scene: bpy.types.Scene) -> tuple[bpy.types.SpaceView3D, bpy.type
     return None if best is None or not best[0][1] else best[1:]
 
 
-def view_camera(scene: bpy.types.Scene) -> Camera | None:
+def view_camera(scene: Scene) -> Camera | None:
     """The view of the viewport that `viewport_of` finds; None where there is none."""
     found = viewport_of(scene)
     if found is None:
         return None
     space, region = found
     view, projection = (np.array(m, np.float64) for m in (space.region_3d.view_matrix, space.region_3d.window_matrix))
-    return camera_of(view, projection, (space.clip_start, space.clip_end), (region.width, region.height))
+    return _camera_of(view, projection, (space.clip_start, space.clip_end), (region.width, region.height))
 
 
-def camera_of(view: Floats, projection: Floats, clip: tuple[float, float], size: tuple[int, int]) -> Camera:
-    """The camera of the matrices that OpenGL draws with.
+def _camera_of(view: Floats, projection: Floats, clip: tuple[float, float], size: tuple[int, int]) -> Camera:
+    """The camera of the matrices (4, 4) that OpenGL draws with, to camera space and on to the cube that is drawn.
 
-    Parameters
-    ----------
-    view, projection : (4, 4) float64
-        From world to camera space, and from there to the cube that is drawn.
-    clip : tuple of float
-        Near and far clipping depths, meters. Orthographic views also show what is as far behind them.
-    size : tuple of int
-        Pixels.
+    Orthographic views show as far behind them as before them.
     """
     to_world = np.linalg.inv(view)
     frame = to_world[:3, :3] / np.linalg.norm(to_world[:3, :3], axis=0)

@@ -145,11 +145,11 @@ def _surface(name: str, mesh: bpy.types.Mesh, materials: list[bpy.types.Material
     positions = read(mesh, "position").astype(np.float64)
     if not np.isfinite(positions).all():
         raise SceneError(f'"{name}" has vertices that are not finite numbers; delete them')
-    corner_verts, offsets = read(mesh, ".corner_vert"), face_offsets(mesh)
+    corners, offsets = read(mesh, ".corner_vert"), face_offsets(mesh)
     triangles = members(mesh.loop_triangles, "loops", 3, np.int32)
     slot = np.clip(members(mesh.polygons, "material_index", dtype=np.int32), 0, len(materials) - 1)
-    attributes = dict(_attributes(mesh, corner_verts, np.diff(offsets)))
-    solid, leaf, width = mesh_features(positions, corner_verts, offsets)
+    attributes = dict(_attributes(mesh, corners, np.diff(offsets)))
+    solid, leaf, width = mesh_features(positions, corners, offsets)
     seen = [looks.of(material, attributes) for material in materials]
     transmission = np.array([look.transmission for look in seen], np.float64)
     # Unknown transmission: light goes through a material whose faces are mostly sheets.
@@ -160,9 +160,7 @@ def _surface(name: str, mesh: bpy.types.Mesh, materials: list[bpy.types.Material
     normals = members(mesh.corner_normals, "vector", 3) if smooth else None
     colors, coverage = (np.array([getattr(look, of) for look in seen], np.float64) for of in ("color", "coverage"))
     of_slots = slot, colors, transmission, coverage
-    return Surface(
-        name, positions, corner_verts, offsets, triangles, *of_slots, solid, leaf, width, attributes, normals
-    )
+    return Surface(name, positions, corners, offsets, triangles, *of_slots, solid, leaf, width, attributes, normals)
 
 
 def _attributes(mesh: bpy.types.Mesh, corner_verts: Integers32, sizes: Integers32) -> Iterator[tuple[str, Floats32]]:

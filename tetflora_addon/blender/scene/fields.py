@@ -407,9 +407,8 @@ def in_year(
     )
     if sizes is None:
         return chosen, None
-    columns = {
-        f.name: _between(getattr(sizes, f.name), a, b, part) for f in fields(sizes) if f.name not in {"plant", "lives"}
-    }
+    names = {column.name for column in fields(sizes)} - {"plant", "lives"}
+    columns = {name: _between(getattr(sizes, name), a, b, part) for name in names}
     for name in ("height", "diameter", "width"):  # what is known of one of them only holds for both
         one, other = getattr(sizes, name)[a], getattr(sizes, name)[b]
         columns[name] = np.where((one > 0.0) & (other > 0.0), columns[name], np.maximum(one, other))
@@ -485,8 +484,6 @@ def read_aged_field(
 
     Parameters
     ----------
-    obj : bpy.types.Object
-        Original object.
     depsgraph : bpy.types.Depsgraph
         Applies modifiers. A field that it does not evaluate is read without them.
     matrices : (k, 4, 4) float64

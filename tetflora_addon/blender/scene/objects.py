@@ -141,12 +141,10 @@ def view_layer_groups(scene: bpy.types.Scene) -> list[list[bpy.types.ViewLayer]]
         return [layers]  # at no cost: animations of ten thousand objects mostly have one
     groups: dict[frozenset[tuple[int, str]], list[bpy.types.ViewLayer]] = {}
     for layer in layers:
-        rendered = list(renderable_objects(layer))
-        if any(may_take_part(o) for o in rendered):
+        shown = list(renderable_objects(layer))
+        if any(may_take_part(o) for o in shown):
             looks = LayerLooks(layer, viewports=False)
-            held = frozenset(
-                (o.session_uid, looks.of(o)) for o in rendered if may_take_part(o) or o.tetflora.is_occluder
-            )
+            held = frozenset((o.session_uid, looks.of(o)) for o in shown if may_take_part(o) or o.tetflora.is_occluder)
             groups.setdefault(held, []).append(layer)
     return list(groups.values()) or [layers[:1]]
 
@@ -419,12 +417,7 @@ def _triangles(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Floats:
 
 
 def read_occluders(depsgraph: bpy.types.Depsgraph) -> Floats:
-    """Triangles of all occluders of a view layer that render.
-
-    Returns
-    -------
-    (t, 3, 3) float64
-        Corners in world space, meters; ``(0, 3, 3)`` if there are none.
+    """Triangles (t, 3, 3) of all occluders of a view layer that render, in world space, meters.
 
     Raises
     ------

@@ -214,8 +214,7 @@ class AssetPlants:
     """Plants of one species that is an asset."""
 
     species: str  # identifier
-    #: The original object that they are, that they are instances of, or whose points they are; several objects of a
-    #: plant each, one for each place
+    #: The original object that they are, are instances of, or whose points they are; or several, one for each place
     owners: tuple[Object, ...]
     seed: Integers  # (n,)
     #: (n, 4, 4): To world space; stretched and mirrored as the objects, points and instances are
@@ -269,9 +268,8 @@ def read_asset_plants(scene: Scene, depsgraph: Depsgraph) -> list[AssetPlants]:
         bad = ~np.isfinite(plants.matrices).all(axis=(1, 2))
         if bad.any():
             names = [plants.owners[min(i, len(plants.owners) - 1)].name for i in np.flatnonzero(bad).tolist()[:_NAMED]]
-            raise SceneError(
-                f"{listed(list(dict.fromkeys(names)))}: an invalid position; clear it with Alt S and Alt G"
-            )
+            named = listed(list(dict.fromkeys(names)))
+            raise SceneError(f"{named}: an invalid position; clear it with Alt S and Alt G")
     return found
 
 

@@ -191,8 +191,6 @@ def gallery_of(entries: str, kind: type[SpeciesChoice]) -> object:
     ----------
     entries : str
         Name of the list of species in the group of properties to which this is given.
-    kind : type
-        Class of the list's entries.
     """
     return once.choice(
         "Add Species",

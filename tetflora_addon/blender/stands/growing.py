@@ -49,14 +49,8 @@ class Soil:
     slope_max: float
 
 
-def stand_site(ground: Terrain, soil: Soil) -> tuple[StandSite, Floats]:
-    """The site of a stand, and the place (2,) in the world that its coordinates are counted from.
-
-    Raises
-    ------
-    SceneError
-        No plant can be anywhere.
-    """
+def _stand_site(ground: Terrain, soil: Soil) -> tuple[StandSite, Floats]:
+    """The site of a stand, on which plants can be, and the place (2,) that its coordinates are counted from."""
     grid, wetness = _grid(ground.triangles, soil.relief)
     there = np.isfinite(grid.height)
     if not there.any():
@@ -65,9 +59,8 @@ def stand_site(ground: Terrain, soil: Soil) -> tuple[StandSite, Floats]:
             "mesh"
         )
     height = _whole(grid.height)
-    rise = [
-        np.gradient(height, grid.cell, axis=a) if n > 1 else np.zeros_like(height) for a, n in enumerate(height.shape)
-    ]
+    sides = enumerate(height.shape)
+    rise = [np.gradient(height, grid.cell, axis=a) if n > 1 else np.zeros_like(height) for a, n in sides]
     plantable = there & (np.hypot(*rise) <= np.tan(min(soil.slope_max, 1.57)))
     if not plantable.any():
         raise SceneError(
@@ -230,9 +223,8 @@ def new_stand_steps(
 @job("Growing the stand")
 def again_steps(data: JobData, field: Object) -> Job[GrownStand]:
     """Grow a stand again by its own settings, in place of its plants; as `new_stand_steps`."""
-    grounds = [
-        e.object for e in field.tetflora.stand.grounds if e.object is not None and data.scene in e.object.users_scene
-    ]
+    named = (entry.object for entry in field.tetflora.stand.grounds)
+    grounds = [obj for obj in named if obj is not None and data.scene in obj.users_scene]
     data.add_objects([*grounds, field])
     return (yield from _again_steps(data, field, grounds))
 
@@ -255,7 +247,7 @@ def _again_steps(data: JobData, field: Object, grounds: list[Object]) -> Job[Gro
     ground = read_ground(grounds, depsgraph, **{name: getattr(stand, name) for name in _MASKS})
     ground = zoned(depsgraph, stand, grounds, ground)
     stood_on = forms_of(grounds, lambda obj: ground_form(obj, depsgraph))
-    site, corner = yield from call_in_thread(progress, stand_site, ground, soil)
+    site, corner = yield from call_in_thread(progress, _stand_site, ground, soil)
     try:
         growing = steps_in_thread(grow(site, members, settings), Progress(0.0, "Growing the stand"))
         with closing(growing) as steps:

@@ -234,7 +234,7 @@ def _on_frame(scene: Scene, depsgraph: Depsgraph | None = None) -> None:
     if not watched or not on_main_thread():
         schedule()
     elif timeline_moves() and scene.tetflora.preview.plants == 'LIGHT':
-        follow(scene, depsgraph, preview, views_of(scene))
+        _follow(scene, depsgraph, preview, views_of(scene))
         schedule()
     elif preview.seconds >= _QUICK:
         schedule()
@@ -248,14 +248,8 @@ def _moved(depsgraph: Depsgraph) -> bool:
     return any(not (isinstance(one, Object) and one.type in {'CAMERA', 'LIGHT'}) for one in changed)
 
 
-def follow(scene: Scene, depsgraph: Depsgraph, preview: Preview, views: Sequence[NDArray[np.float64]]) -> None:
-    """Show some of the plants in view, on the scene's day and in its year; they are read at the first frame only.
-
-    Parameters
-    ----------
-    views : list of (4, 4) float64
-        From the world to what viewports show of it.
-    """
+def _follow(scene: Scene, depsgraph: Depsgraph, preview: Preview, views: Sequence[NDArray[np.float64]]) -> None:
+    """Show some of the plants in views (4, 4), on the scene's day and in its year; they are read at first only."""
     try:
         running, known = preview.running, (stand_years(scene), gone_species(scene))
         if running is None or running.known != known or _moved(depsgraph):

@@ -76,10 +76,9 @@ def wires(levels: Levels, level: Level, color: str, forms: set[str]) -> gpu.type
         return None
     vertices = levels.vertices(level, some)
     shown = colors_of(level, color, int(levels.levels[-1].depth.max()))[some]
+    colors = np.repeat(_opaque(shown, _WIRE_ALPHA), 4, axis=0)
     indices = EDGES[None] + 4 * np.arange(len(some))[:, None, None]
-    return batch(
-        'LINES', vertices.reshape(-1, 3), np.repeat(_opaque(shown, _WIRE_ALPHA), 4, axis=0), indices.reshape(-1, 2)
-    )
+    return batch('LINES', vertices.reshape(-1, 3), colors, indices.reshape(-1, 2))
 
 
 def translucent(

@@ -66,14 +66,8 @@ class _State:
 _state = _State()
 
 
-def dots_of(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> Dots:
-    """Dots for the population that the panel shows, without a change to anything.
-
-    Raises
-    ------
-    TetFloraError
-        Its settings leave no place, as the message says.
-    """
+def _dots_of(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> Dots:
+    """Dots for the population that the panel shows; an error where its settings leave no place."""
     population = shown_population(scene)
     if population.frozen:
         raise TetFloraError(f'"{population.name}" is frozen and keeps its plants; turn off Freeze to preview changes')
@@ -124,7 +118,7 @@ def _place(scene: bpy.types.Scene | None) -> None:
         _clear()
         return
     try:
-        dots = dots_of(scene, bpy.context.evaluated_depsgraph_get())
+        dots = _dots_of(scene, bpy.context.evaluated_depsgraph_get())
         _state.error = ""
     except TetFloraError as wrong:
         dots, _state.error = None, str(wrong)
