@@ -3,12 +3,13 @@
 """Words that gave way to those of the field and to American spelling; `problems` finds the places where one came back.
 
 Names that are common words where they are right cannot be found by their letters: ``look``, ``afford`` and ``real`` of
-what is counted, ``code`` of coordinate systems, ``form`` of skeletons and proxies, ``girth`` of trunks' diameters,
-``some``, ``made``, ``found`` and ``own`` where a noun would say what is held. Reviews have to see these.
+what is counted, ``code`` of coordinate systems, ``form`` of skeletons and proxies, ``girth`` of trunks' diameters.
+Reviews have to see these. `fillers` finds variables of the product whose names tell nothing.
 """
 
 from __future__ import annotations
 
+import ast
 import re
 from fnmatch import fnmatch
 
@@ -54,6 +55,8 @@ _NAMES = {
 }
 _PATTERNS = [(re.compile(old, re.IGNORECASE), new) for old, new in _SPELLING.items()]
 _PATTERNS += [(re.compile(rf"(?<!\w)(?:{old})(?!\w)"), new) for old, new in _NAMES.items()]
+#: What variables and parameters are not called: a noun says what they hold.
+_FILLERS = {"at", "found", "made", "own", "some", "there"}
 #: Files of foreign words, of others and of tests by earlier names; and units of coordinate systems, as standards spell
 #: them, and addresses.
 _FOREIGN = ("tetflora_addon/geodata/*.json", "tests/data/*", "examples/data/*", "LICENSE", "devtools/proofs.json")
@@ -71,3 +74,13 @@ def problems(name: str, lines: list[str]) -> list[str]:
             if word := pattern.search(text):
                 found.append(f'{name}:{number}: "{word[0]}" gave way to: {new}')
     return found
+
+
+def fillers(name: str, tree: ast.Module) -> list[str]:
+    """Variables and parameters in functions of a file that have a filler for a name, one line each."""
+    functions = [n for n in ast.walk(tree) if isinstance(n, ast.FunctionDef | ast.Lambda)]
+    nodes = [n for function in functions for n in ast.walk(function)]
+    bound = [(n.lineno, n.id) for n in nodes if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Store)]
+    bound += [(n.lineno, n.arg) for n in nodes if isinstance(n, ast.arg)]
+    words = sorted({(line, word) for line, word in bound if word in _FILLERS})
+    return [f'{name}:{line}: "{word}" says nothing of what it holds' for line, word in words]

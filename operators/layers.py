@@ -17,7 +17,7 @@ from ..tetflora_addon.blender.declare import boolean, choice, once, string
 from ..tetflora_addon.blender.placing import cover, populations
 from ..tetflora_addon.blender.placing.first_forest import is_startup
 from ..tetflora_addon.blender.placing.populations import PlacedPlants, make_plants_steps, remove_layer, reroll_steps
-from ..tetflora_addon.blender.placing.rules import active_population, grounds_of, grounds_seen, set_grounds
+from ..tetflora_addon.blender.placing.rules import active_population, briefly, grounds_of, grounds_seen, set_grounds
 from ..tetflora_addon.blender.runtime import is_there
 from ..tetflora_addon.blender.settings import BIOME, FIELD, SCATTER, rules_of, with_identity
 from ..tetflora_addon.blender.species.edits import grow_in_wood
@@ -41,8 +41,14 @@ def grounds_to_plant(context: bpy.types.Context) -> list[bpy.types.Object]:
     return grounds_of(context.scene, rules_of(layer))
 
 
+def ground_names(context: bpy.types.Context) -> str:
+    """Of the same, as a panel says them: those of a layer as they were found last."""
+    grounds, layer = selected_grounds(context), layers.active_layer(context.scene)
+    return briefly(grounds) if grounds or layer is None else grounds_seen(layer).names
+
+
 ground_selected = need(selected_grounds, "Select a mesh to plant on")
-ground_found = need(grounds_to_plant, "Select a mesh to plant on")
+ground_found = need(ground_names, "Select a mesh to plant on")
 layer_exists = need(lambda context: layers.active_layer(context.scene), "Add a layer first")
 scatter_active = need(lambda context: active_population(context.scene), "Click a Scatter or Cover layer first")
 _ACTIVE = (in_object_mode, layer_exists)

@@ -5,7 +5,7 @@
 import bpy
 from bpy.utils import units
 
-from ..operators.layers import grounds_to_plant
+from ..operators.layers import ground_names
 from ..tetflora_addon.blender.biomes.layers import GROUP, STAND, active_layer, is_due, is_gone, kind_of, plants_in
 from ..tetflora_addon.blender.biomes.library import FALLBACK_ICON, biomes, icon_of, items
 from ..tetflora_addon.blender.placing.distances import follows_species, suggestion
@@ -75,10 +75,8 @@ def TETFLORA_MT_add_biome(layout: bpy.types.UILayout, _context: bpy.types.Contex
 @base.popover("Add Layer", 30)
 def TETFLORA_PT_add_layer(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
     """What can grow on the selected meshes; opened from the list of layers."""
-    grounds = grounds_to_plant(context)
-    more = f" and {len(grounds) - 1:,} more" if len(grounds) > 1 else ""
-    text = "A biome brings land of its own; select a mesh to plant on it"
-    layout.label(text=f"On {grounds[0].name}{more}" if grounds else text, icon='MESH_GRID')
+    names, text = ground_names(context), "A biome brings land of its own; select a mesh to plant on it"
+    layout.label(text=f"On {names}" if names else text, icon='MESH_GRID')
     pictures = layout.grid_flow(row_major=True, columns=4, even_columns=True, even_rows=True)
     known = biomes()
     for identifier, name, _, icon, _ in items():

@@ -186,3 +186,16 @@ def test_words_that_gave_way_are_found_and_those_of_others_are_not() -> None:
     ]
     assert words.problems("a.py", kept) == []
     assert words.problems("tests/data/a.csv", gone) == []
+
+
+def test_variables_of_the_product_are_named_by_what_they_hold() -> None:
+    code = """
+class Field:
+    made: int
+
+def plants_of(at, *, scale=1.0):
+    (own, light), rest = at
+    return [some.size for some in rest if (found := lambda made: made)(some.own) and self.there]
+"""
+    told = [text.split(": ")[0] + text.split('"')[1] for text in words.fillers("a.py", ast.parse(code))]
+    assert told == ["a.py:5at", "a.py:6own", "a.py:7found", "a.py:7made", "a.py:7some"]

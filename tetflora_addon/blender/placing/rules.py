@@ -218,11 +218,15 @@ def ground_steps(scene: Scene, view_layer: ViewLayer) -> Generator[None, None, d
     read = [(uid, one.stood_on, grounds_of(scene, one), [e.object for e in one.grounds]) for uid, one in kept]
     for uid, before, there, named in read:
         moved, present = before and lies_elsewhere(before, forms_of(there, form)), {None, *there}
-        names = ", ".join(obj.name for obj in there[:2]) + (f" and {len(there) - 2:,} more" if len(there) > 2 else "")
         missing = tuple(obj.name for obj in named if obj not in present)
-        seen[uid] = SeenGrounds(names, missing, before if moved else "")
+        seen[uid] = SeenGrounds(briefly(there), missing, before if moved else "")
         yield
     return seen
+
+
+def briefly(objects: list[Object]) -> str:
+    """Names of the first two, and how many follow."""
+    return ", ".join(obj.name for obj in objects[:2]) + (f" and {len(objects) - 2:,} more" if len(objects) > 2 else "")
 
 
 #: What `ground_steps` found, a moment after each change.
