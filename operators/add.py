@@ -52,8 +52,8 @@ class TETFLORA_OT_add_plant(Reporting, Operator, label="Add Plant", needs=(in_ob
         if not properties.is_property_set("seed"):
             self.seed = next_seed(context.scene)
         species = default_species() if self.species in {"", NO_SPECIES} else self.species
-        made = add_plant(context.scene, self.location, self.azimuth, self.scale, self.seed, species)
-        select_only(context, made)
+        plants = add_plant(context.scene, self.location, self.azimuth, self.scale, self.seed, species)
+        select_only(context, plants)
         return {'FINISHED'}
 
 
@@ -88,8 +88,8 @@ class TETFLORA_OT_use_as_skeleton(
                 plant.empty_display_size = height  # the arrow was as tall as the species grows by itself
         form.hide_render = True
         select_only(context, plants)
-        made = f"{counted(len(skeleton.points), 'point')} drawn"
-        return self.done(f'"{form.name}" is now the skeleton of {counted(len(plants), "plant")}: {made}')
+        drawing = f"{counted(len(skeleton.points), 'point')} drawn"
+        return self.done(f'"{form.name}" is now the skeleton of {counted(len(plants), "plant")}: {drawing}')
 
 
 class TETFLORA_OT_first_forest(Reporting, Operator, label="First Forest", needs=(in_object_mode,)):
@@ -116,8 +116,8 @@ class TETFLORA_OT_first_forest(Reporting, Operator, label="First Forest", needs=
         for area in (area for area in areas if area.type == 'VIEW_3D'):
             area.spaces.active.region_3d.view_perspective = 'CAMERA'
         note = f" ({note})" if note else ""
-        made = f"Created a forest of {plants} plants and ground cover{note}"
-        return self.done(f"{made}. Press F12 to render it, click Refine to see it here")
+        text = f"Created a forest of {plants} plants and ground cover{note}"
+        return self.done(f"{text}. Press F12 to render it, click Refine to see it here")
 
 
 # What is not given comes from the panel's settings: defaults do not matter here.

@@ -49,8 +49,8 @@ class Tool:
         cls, label: str = "", needs: tuple[Need, ...] = (), told: str = "", options: set[str] | None = None
     ) -> None:
         super().__init_subclass__()
-        own = {"bl_label": label, "needs": needs, "told": told, "bl_options": options}
-        for name, value in own.items():
+        attributes = {"bl_label": label, "needs": needs, "told": told, "bl_options": options}
+        for name, value in attributes.items():
             if value:
                 setattr(cls, name, value)
         if cls.__name__.startswith("TETFLORA_OT_"):
@@ -137,8 +137,8 @@ def plants_selected(context: bpy.types.Context) -> str:
 
 def plants_or_fields_selected(context: bpy.types.Context) -> str:
     """At least one plant or field of plants is selected that this file may change."""
-    found = [obj for obj in context.selected_objects if obj.tetflora.is_plant or obj.tetflora.is_field]
-    return _editable(found, "Select plants or a field of plants first")
+    selected = [obj for obj in context.selected_objects if obj.tetflora.is_plant or obj.tetflora.is_field]
+    return _editable(selected, "Select plants or a field of plants first")
 
 
 def _editable(objects: list[bpy.types.Object], message: str) -> str:

@@ -53,8 +53,8 @@ class TETFLORA_OT_export_forest(
         return forest.export_steps(context.scene, context.evaluated_depsgraph_get(), order)
 
     def finish(self, context: Context, result: forest.Exported) -> set[str]:
-        made = f"{counted(result.plants, 'plant')} as {counted(result.variants, 'variant')}"
-        told = [f"{made} written to {result.path}, {result.megabytes:,.1f} MB", *result.problems]
+        counts = f"{counted(result.plants, 'plant')} as {counted(result.variants, 'variant')}"
+        told = [f"{counts} written to {result.path}, {result.megabytes:,.1f} MB", *result.problems]
         return self.done(". ".join(told), warns=result.problems)
 
 

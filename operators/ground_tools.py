@@ -123,11 +123,11 @@ class GroundTool(Tool):
 
     def point(self, context: bpy.types.Context, event: bpy.types.Event) -> bool:
         """Find the ground under the mouse; False where the mouse is not over a 3D view."""
-        found = _region_at(context.screen, event.mouse_x, event.mouse_y)
-        if found is None:
+        viewport = _region_at(context.screen, event.mouse_x, event.mouse_y)
+        if viewport is None:
             self._hit = None
             return False
-        region, view = found
+        region, view = viewport
         place = (event.mouse_x - region.x, event.mouse_y - region.y)
         origin = view3d_utils.region_2d_to_origin_3d(region, view, place)
         self._hit = self._ground.cast(origin, view3d_utils.region_2d_to_vector_3d(region, view, place))
@@ -228,9 +228,9 @@ class TETFLORA_OT_place_plant(GroundTool, Operator, label="Place Plants by Click
 
     def _plant(self, context: bpy.types.Context) -> None:
         scene = context.scene
-        made = add_plant(scene, self._hit[0], self._turn, self._scale, next_seed(scene), self._chosen)
+        plants = add_plant(scene, self._hit[0], self._turn, self._scale, next_seed(scene), self._chosen)
         context.view_layer.update()
-        select_only(context, made)
+        select_only(context, plants)
         self._changed = True
         self.pushed(context, "Place Plant")
 

@@ -36,8 +36,8 @@ def selected_grounds(context: bpy.types.Context) -> list[bpy.types.Object]:
 def grounds_to_plant(context: bpy.types.Context) -> list[bpy.types.Object]:
     """Selected meshes or, without any, the ground of the active layer: what one adds next grows there too."""
     layer = layers.active_layer(context.scene)
-    if (found := selected_grounds(context)) or layer is None:
-        return found
+    if (grounds := selected_grounds(context)) or layer is None:
+        return grounds
     return grounds_of(context.scene, rules_of(layer))
 
 
@@ -55,17 +55,17 @@ _ACTIVE = (in_object_mode, layer_exists)
 _ROW = 20.0  # pixels of a row of a list at a scale of 1
 
 
-def tell_placed(operator: Reporting, made: PlacedPlants) -> set[str]:
+def tell_placed(operator: Reporting, plants: PlacedPlants) -> set[str]:
     """Report how many plants of a layer were placed, and why not more."""
     where = ""
-    if made.objects and made.objects[0].tetflora.is_field:
-        where = f' in the field "{made.objects[0].name}"'
-    placed = f"{counted(made.number, 'plant')} of {made.wanted:,} placed{where}: {made.reason}"
-    if made.reason:
+    if plants.objects and plants.objects[0].tetflora.is_field:
+        where = f' in the field "{plants.objects[0].name}"'
+    placed = f"{counted(plants.number, 'plant')} of {plants.wanted:,} placed{where}: {plants.reason}"
+    if plants.reason:
         return operator.done(placed, warns=True)
-    returned = f"; {counted(made.returned, 'deleted plant')} restored" if made.returned else ""
-    erased = f"; {made.erased:,} omitted where you erased" if made.erased else ""
-    return operator.done(f"{counted(made.number, 'plant')} placed{where}{returned}{erased}")
+    returned = f"; {counted(plants.returned, 'deleted plant')} restored" if plants.returned else ""
+    erased = f"; {plants.erased:,} omitted where you erased" if plants.erased else ""
+    return operator.done(f"{counted(plants.number, 'plant')} placed{where}{returned}{erased}")
 
 
 def tell_layers(
@@ -142,7 +142,7 @@ class TETFLORA_OT_update_layers(_InParts, Operator, label="Update", needs=_ACTIV
         return (yield from self._each(scene, depsgraph, uids)) if uids else None
 
     def _each(self, scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, uids: list[str]) -> Job[Updated]:
-        made, bare = [], []
+        grown, bare = [], []
         biomes = {with_identity(scene.tetflora.layers, uid).biome for uid in uids} - {""}
         for number, uid in enumerate(uids):
             depsgraph.update()  # plants of the layers before shade the ground, and keep others away
@@ -153,7 +153,7 @@ class TETFLORA_OT_update_layers(_InParts, Operator, label="Update", needs=_ACTIV
             try:
                 with closing(self._steps_of(depsgraph, layer, uids[number + 1 :])) as steps:
                     one = yield from part_of(steps, number / len(uids), (number + 1) / len(uids), name)
-                made.append(one)
+                grown.append(one)
                 if isinstance(one, PlacedPlants) and one.reason and not one.number:
                     bare.append(f"{name}: {one.reason}")
             except TetFloraError as error:
@@ -164,7 +164,7 @@ class TETFLORA_OT_update_layers(_InParts, Operator, label="Update", needs=_ACTIV
         for biome in filter(None, (with_identity(scene.tetflora.layers, uid) for uid in biomes)):
             depsgraph.update()
             kept += adding.lay_biome_soil(depsgraph, [e.object for e in biome.grounds if e.object is not None])
-        return made, bare, kept
+        return grown, bare, kept
 
     def _steps_of(
         self, depsgraph: bpy.types.Depsgraph, layer: bpy.types.PropertyGroup, later: list[str]
@@ -190,10 +190,10 @@ class TETFLORA_OT_update_layers(_InParts, Operator, label="Update", needs=_ACTIV
             return {'CANCELLED'}
         points.schedule()
         context.scene.update_tag()
-        made, *rest = result
-        if len(made) == 1 and isinstance(made[0], PlacedPlants):
-            return tell_placed(self, made[0])
-        numbers = [n if isinstance(n, int) else n.number if isinstance(n, PlacedPlants) else n.plants for n in made]
+        grown, *rest = result
+        if len(grown) == 1 and isinstance(grown[0], PlacedPlants):
+            return tell_placed(self, grown[0])
+        numbers = [n if isinstance(n, int) else n.number if isinstance(n, PlacedPlants) else n.plants for n in grown]
         return tell_layers(self, "", numbers, *rest)
 
 
@@ -260,9 +260,9 @@ class TETFLORA_OT_duplicate_layer(Reporting, Operator, label="Duplicate Layer", 
         grounds = selected_grounds(context) if self.to_selected else None
         if grounds == []:
             return self.failed("Select a mesh to copy the layer to")
-        made = layers.copy_layer(context.scene, layers.active_layer(context.scene), grounds)
+        layer = layers.copy_layer(context.scene, layers.active_layer(context.scene), grounds)
         points.schedule()
-        return self.done(f'"{made.name}" added; click Update to grow it')
+        return self.done(f'"{layer.name}" added; click Update to grow it')
 
 
 class TETFLORA_OT_remove_layer(Reporting, Operator, label="Remove Layer", needs=_ACTIVE):
@@ -301,10 +301,10 @@ class TETFLORA_OT_ground_snow(Reporting, Operator, label="Snow on Ground", needs
     """
 
     def run(self, context: bpy.types.Context) -> set[str]:
-        found = cover.cover_with_snow(context.scene, cover.covered_population(context.scene))
-        if not found:
+        materials = cover.cover_with_snow(context.scene, cover.covered_population(context.scene))
+        if not materials:
             return self.refused("The materials of the ground have snow already")
-        return self.done(f"{counted(len(found), 'material')} can have snow; set Snow under Season and Wind")
+        return self.done(f"{counted(len(materials), 'material')} can have snow; set Snow under Season and Wind")
 
 
 _may_be_saved = need(lambda context: saved_populations(context.scene), "Add a layer with plants first")
@@ -359,7 +359,7 @@ class TETFLORA_OT_add_biome(ModalJob, Operator, label="Add Biome", needs=(in_obj
         try:
             context.view_layer.update()
             depsgraph = context.evaluated_depsgraph_get()
-            made = yield from adding.add_biome_steps(scene, depsgraph, biome, grounds, self.seed)
+            planted = yield from adding.add_biome_steps(scene, depsgraph, biome, grounds, self.seed)
         except BaseException:  # an error, or Esc
             if is_there(land):
                 bpy.data.meshes.remove(land.data)
@@ -372,7 +372,7 @@ class TETFLORA_OT_add_biome(ModalJob, Operator, label="Add Biome", needs=(in_obj
             year.enabled, year.day = True, biome.season["day"]
             year.latitude = biome.season.get("latitude", year.latitude)
         select_only(context, grounds)
-        return made
+        return planted
 
     def finish(self, context: bpy.types.Context, result: adding.BiomeResult) -> set[str]:
         points.schedule()
@@ -395,11 +395,11 @@ class TETFLORA_OT_ground_cover(_InParts, Operator, label="Ground Cover", needs=(
 
     def steps(self, context: bpy.types.Context) -> Job[cover.CoverResult]:
         scene, depsgraph = context.scene, context.evaluated_depsgraph_get()
-        made = yield from cover.cover_steps(scene, depsgraph, cover.covered_population(scene), self.soil)
+        covering = yield from cover.cover_steps(scene, depsgraph, cover.covered_population(scene), self.soil)
         self.cancelled = "Stopped; the cover stays, without fallen leaves"
         if self.fallen and scene.tetflora.year.enabled:
             yield from cover.strew_steps(scene, depsgraph, cover.covered_population(scene))
-        return made
+        return covering
 
     def finish(self, context: bpy.types.Context, result: cover.CoverResult) -> set[str]:
         points.schedule()
@@ -427,8 +427,8 @@ class TETFLORA_OT_grow_stand(ModalJob, Operator, label="Grow Stand", needs=(in_o
 def active_stand(context: bpy.types.Context) -> bpy.types.Object | None:
     """The stand that is the active object, or else the active layer."""
     layer = layers.active_layer(context.scene)
-    found = (context.active_object, None if layer is None else layer.field)
-    return next((obj for obj in found if growing.is_stand(obj)), None)
+    candidates = (context.active_object, None if layer is None else layer.field)
+    return next((obj for obj in candidates if growing.is_stand(obj)), None)
 
 
 _OF_STAND = (

@@ -122,19 +122,19 @@ class TETFLORA_OT_mark(Reporting, Operator, label="Use Selected Objects As", tol
         return self.done(f'The points of "{obj.name}" are now plants')
 
     def _mark_scatters(self, context: bpy.types.Context) -> set[str]:
-        found = _scatterers(context)
-        if not found:
+        scatterers = _scatterers(context)
+        if not scatterers:
             return self.failed(
                 "Select an object that scatters others first, by geometry nodes, particles, instancing or as a "
                 "collection instance"
             )
-        if not self._wanted(all(is_scatter(o) for o in found)):
-            for obj in found:
+        if not self._wanted(all(is_scatter(o) for o in scatterers)):
+            for obj in scatterers:
                 mark_scatter(context.scene, obj, False)
-            return self.done(f"The scatter of {counted(len(found), 'object')} stays plain")
+            return self.done(f"The scatter of {counted(len(scatterers), 'object')} stays plain")
         depsgraph = context.evaluated_depsgraph_get()
         instances, assets, left, wrong, done = 0, set(), 0, [], 0
-        for obj in found:
+        for obj in scatterers:
             try:
                 scatter = scattered(obj, depsgraph)
             except SceneError as error:
@@ -156,8 +156,8 @@ class TETFLORA_OT_mark(Reporting, Operator, label="Use Selected Objects As", tol
 def _scatterers(context: bpy.types.Context) -> list[bpy.types.Object]:
     """Selected objects that scatter, or else the active one: results hide it, and nobody can select it then."""
     for objects in (context.selected_objects, [context.view_layer.objects.active]):
-        if found := [o for o in objects if o is not None and (may_scatter(o) or is_scatter(o))]:
-            return found
+        if scatterers := [o for o in objects if o is not None and (may_scatter(o) or is_scatter(o))]:
+            return scatterers
     return []
 
 
@@ -201,19 +201,19 @@ class TETFLORA_OT_convert_plants(
 
     def _to_objects(self, context: bpy.types.Context) -> set[str]:
         depsgraph = context.evaluated_depsgraph_get()
-        made: list[bpy.types.Object] = []
+        objects: list[bpy.types.Object] = []
         for field in [o for o in fields_of(context.selected_objects) if o.library is None]:
             owner = owner_of(context.scene, [field])
             home = collection_of(context.scene, owner) if owner else None
-            plants = plant_objects.plants_from_field(context.scene, depsgraph, field, MOST_EMPTIES - len(made), home)
+            plants = plant_objects.plants_from_field(context.scene, depsgraph, field, MOST_EMPTIES - len(objects), home)
             if owner:
                 adopt(context.scene, owner, plants)
-            made += plants
-        if not made:
+            objects += plants
+        if not objects:
             return self.refused("Select a field of plants first; those that are linked must be made local")
         forget_gone(context.scene)
-        select_only(context, made)
-        return self.done(f"{counted(len(made), 'plant')} made")
+        select_only(context, objects)
+        return self.done(f"{counted(len(objects), 'plant')} made")
 
 
 class TETFLORA_OT_edit_list(
@@ -254,7 +254,7 @@ class TETFLORA_OT_edit_list(
 def chosen(context: bpy.types.Context, name: str = "") -> list[Datablock]:
     """What an operator is for: the collection of that name, else what is selected in the Outliner or the 3D view."""
     if name:
-        return [found] if (found := bpy.data.collections.get(name)) else []
+        return [collection] if (collection := bpy.data.collections.get(name)) else []
     if context.area is not None and context.area.type == 'OUTLINER':
         return [i for i in context.selected_ids if isinstance(i, bpy.types.Object | bpy.types.Collection)]
     return list(context.selected_objects)
@@ -279,23 +279,23 @@ class TETFLORA_OT_use_as_species(Reporting, Operator, label="Use as Species", to
     def missing(cls, context: bpy.types.Context) -> str:
         # A script may name a collection, whatever is selected.
         by_script = context.area is None or context.area.type != 'VIEW_3D'
-        found = (by_script and bpy.data.collections) or any(can_be_species(o) or is_species(o) for o in chosen(context))
+        valid = (by_script and bpy.data.collections) or any(can_be_species(o) or is_species(o) for o in chosen(context))
         nothing = "Select objects with faces, or a collection in the Outliner, first"
-        return in_object_mode(context) or ("" if found else nothing)
+        return in_object_mode(context) or ("" if valid else nothing)
 
     def draw(self, _context: bpy.types.Context) -> None:
         self.layout.prop(self, "variants")
 
     def run(self, context: bpy.types.Context) -> set[str]:
-        found = chosen(context, self.collection)
+        datablocks = chosen(context, self.collection)
         if self.stop:
-            return self._stop(context, [one for one in found if is_species(one)])
-        if not found:
+            return self._stop(context, [one for one in datablocks if is_species(one)])
+        if not datablocks:
             wrong = f'There is no collection "{self.collection}"' if self.collection else "Select an object first"
             return self.refused(wrong)
         depsgraph = context.evaluated_depsgraph_get()
         names, wrong = [], []
-        for datablock in found:
+        for datablock in datablocks:
             try:
                 names.append(use_as_species(context.scene, depsgraph, datablock, self.variants).name)
             except SceneError as error:
@@ -307,11 +307,11 @@ class TETFLORA_OT_use_as_species(Reporting, Operator, label="Use as Species", to
         text += " can now be planted as a species" if len(names) == 1 else " can now be planted as species"
         return self.done(f"{text}; {wrong[0]}" if wrong else text)
 
-    def _stop(self, context: bpy.types.Context, found: list[Datablock]) -> set[str]:
-        if not found:
+    def _stop(self, context: bpy.types.Context, datablocks: list[Datablock]) -> set[str]:
+        if not datablocks:
             return self.refused("Select an object that is used as a species first")
-        species = {asset.identifier for one in found if (asset := asset_of(one)) is not None}
-        number = sum(stop_using(one) > 0 for one in found)
+        species = {asset.identifier for one in datablocks if (asset := asset_of(one)) is not None}
+        number = sum(stop_using(one) > 0 for one in datablocks)
         plants = sum(o.tetflora.is_plant and o.tetflora.species in species for o in context.scene.objects)
         rest = f"; {counted(plants, 'plant')} of it need another species" if plants else ""
         return self.done(f"{counted(number, 'asset')} no longer used as species{rest}")

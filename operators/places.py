@@ -107,8 +107,8 @@ class _Raster(_Importing):
 
     def as_keywords(self, *, ignore: tuple[str, ...] = ()) -> dict[str, Any]:
         """Settings of another call, with files by their names."""
-        found = super().as_keywords(ignore=(*ignore, "files"))
-        return found | {"files": [{"name": file.name} for file in self.files]}
+        keywords = super().as_keywords(ignore=(*ignore, "files"))
+        return keywords | {"files": [{"name": file.name} for file in self.files]}
 
 
 class TETFLORA_OT_import_terrain(_Raster, Operator, label="Import Terrain"):
@@ -173,8 +173,8 @@ class TETFLORA_OT_import_inventory(_Importing, Operator, label="Import Tree Inve
 
     def as_keywords(self, *, ignore: tuple[str, ...] = ()) -> dict[str, Any]:
         """Settings of another call, which takes columns as the table has them."""
-        found = super().as_keywords(ignore=(*ignore, "table", "active"))
-        return found | ({"columns": trees.chosen_columns(self.table)} if self.table else {})
+        keywords = super().as_keywords(ignore=(*ignore, "table", "active"))
+        return keywords | ({"columns": trees.chosen_columns(self.table)} if self.table else {})
 
     def draw(self, _context: Context) -> None:
         layout = self.layout

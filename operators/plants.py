@@ -60,10 +60,10 @@ class TETFLORA_OT_select_plants(Reporting, Operator, label="Select Plants", need
 
     def run(self, context: Context) -> set[str]:
         if self.layer:
-            layer, found = active_layer(context.scene), []
+            layer, plants = active_layer(context.scene), []
             for one in () if layer is None else (layer, *children_of(layer)):
-                found += own_objects(context.scene, one) if one.kind == SCATTER else [one.field] if one.field else []
-            if not found:
+                plants += own_objects(context.scene, one) if one.kind == SCATTER else [one.field] if one.field else []
+            if not plants:
                 return self.refused("The layer has no plants; click Update")
         else:
             active = context.active_object
@@ -71,14 +71,14 @@ class TETFLORA_OT_select_plants(Reporting, Operator, label="Select Plants", need
                 return self.failed("The active object must be a plant; select one")
             self.species = self.species or active.tetflora.species
             every = plant_objects.plants_of(context.view_layer.objects)
-            found = [o for o in every if o.tetflora.species == self.species]
+            plants = [o for o in every if o.tetflora.species == self.species]
         if not self.extend:
             for obj in context.selected_objects:
                 obj.select_set(False)
-        for obj in set(found) & set(context.view_layer.objects):
+        for obj in set(plants) & set(context.view_layer.objects):
             obj.select_set(True)
         of = "" if self.layer else f' of species "{self.species}"'
-        return self.done(f"{counted(len(found), 'plant')}{of} selected")
+        return self.done(f"{counted(len(plants), 'plant')}{of} selected")
 
 
 class TETFLORA_OT_remove_plants(Reporting, Operator, label="Remove Plants", told="which", needs=(in_object_mode,)):

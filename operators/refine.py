@@ -90,13 +90,13 @@ def _made(scene: Scene, statistics: Statistics) -> str:
     what = [base.counted(statistics.plants, "plant")] if statistics.plants or not statistics.instances else []
     what += [f"{instances} of assets"] if statistics.instances else []
     polygons = statistics.polygons_meshed + statistics.polygons_proxy  # as the panel and Max Polygons count
-    made = f"{polygons:,} polygons"
+    geometry = f"{polygons:,} polygons"
     if statistics.instances:
         whole, clusters = statistics.instances_whole, statistics.instances_clusters
-        made = f"{base.counted(whole, 'original')}, {base.counted(clusters, 'cluster')}, {made}"
+        geometry = f"{base.counted(whole, 'original')}, {base.counted(clusters, 'cluster')}, {geometry}"
     elif polygons < statistics.polygons_full:
-        made += f" instead of {statistics.polygons_full:,}"
-    return f"{' and '.join(what)}: {made} in {sum(statistics.seconds.values()):.1f} s"
+        geometry += f" instead of {statistics.polygons_full:,}"
+    return f"{' and '.join(what)}: {geometry} in {sum(statistics.seconds.values()):.1f} s"
 
 
 def _unread_world(scene: Scene) -> str:
@@ -176,11 +176,11 @@ class TETFLORA_OT_make_plant_mesh(
     def steps(self, context: Context) -> Job[list[Object]]:
         return make_plant_mesh_steps(context.scene, context.evaluated_depsgraph_get(), base.selected_plants(context))
 
-    def finish(self, context: Context, made: list[Object]) -> set[str]:
+    def finish(self, context: Context, objects: list[Object]) -> set[str]:
         context.view_layer.update()
-        base.select_only(context, made)
-        polygons = sum(len(obj.data.polygons) for obj in made)
-        return self.done(f"{base.counted(len(made), 'mesh object')} of {polygons:,} polygons made")
+        base.select_only(context, objects)
+        polygons = sum(len(obj.data.polygons) for obj in objects)
+        return self.done(f"{base.counted(len(objects), 'mesh object')} of {polygons:,} polygons made")
 
 
 _camera_found = base.need(

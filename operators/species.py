@@ -115,11 +115,11 @@ class TETFLORA_OT_edit_orders(Reporting, Operator, label="Edit Orders", told="ac
 
 def _add(data: dict) -> None:
     orders = data["orders"]
-    made = copy.deepcopy(orders[-1])
+    order = copy.deepcopy(orders[-1])
     orders[-1]["branches"] = [3, 1]
-    made |= {"length": [0.5, 0.1], "thickness": [0.5, 0.1], "angle": [45, 15], "branches": [0, 0]}
-    made.pop("angle_tip", None)
-    orders.append(made)
+    order |= {"length": [0.5, 0.1], "thickness": [0.5, 0.1], "angle": [45, 15], "branches": [0, 0]}
+    order.pop("angle_tip", None)
+    orders.append(order)
 
 
 def _toggle_spur(data: dict) -> None:

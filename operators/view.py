@@ -169,11 +169,11 @@ class TETFLORA_OT_daylight(Reporting, Operator, label="Daylight"):
         ahead, height = sun_direction(scene, self.hour)
         kept = []
         suns = [o for o in scene.objects if o.type == 'LIGHT' and o.data.type == 'SUN' and not o.hide_render]
-        own = next((o for o in suns if _OURS in o), None)
-        if suns and own is None:
+        sun = next((o for o in suns if _OURS in o), None)
+        if suns and sun is None:
             kept.append(f'the sun "{suns[0].name}"')
         else:
-            _shine(scene, own, ahead, height, self.clouds, self.haze)
+            _shine(scene, sun, ahead, height, self.clouds, self.haze)
         if scene.world is None or _OURS in scene.world or _is_plain(scene.world):
             _cover(scene, height, self.clouds, self.haze)
         else:
@@ -203,8 +203,8 @@ def sun_direction(scene: Scene, hour: float) -> tuple[Vector, float]:
     east = -cos(tilt) * sin(turn)
     north = cos(latitude) * sin(tilt) - sin(latitude) * cos(tilt) * cos(turn)
     up = max(up, 0.03)  # at night it stands on the horizon
-    found = Vector((east, north, up)).normalized()
-    return found, float(np.arcsin(found.z))
+    direction = Vector((east, north, up)).normalized()
+    return direction, float(np.arcsin(direction.z))
 
 
 def _shine(scene: Scene, sun: Object | None, ahead: Vector, height: float, clouds: float, haze: float) -> None:

@@ -179,9 +179,9 @@ class Button(NamedTuple):
     def draw(self, layout: UILayout, **options: object) -> None:
         """Draw it, with further options of ``UILayout.operator``."""
         text = {} if self.text is None else {"text": self.text}
-        made = layout.operator(f"tetflora.{self.operator}", icon=self.icon, **text, **options)
+        properties = layout.operator(f"tetflora.{self.operator}", icon=self.icon, **text, **options)
         for name, value in self.values.items():
-            setattr(made, name, value)
+            setattr(properties, name, value)
 
 
 def draw_buttons(layout: UILayout, *buttons: Button | None) -> None:

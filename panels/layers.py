@@ -221,10 +221,10 @@ def draw_distance(layout: bpy.types.UILayout, settings: bpy.types.PropertyGroup)
     """The switch between the distance that suits the species and the artist's own, and the one that counts."""
     layout.row(heading="Min Distance").prop(settings, "distance_by_species")
     if follows_species(settings):
-        found = suggestion(settings, crown_to_draw)  # None for a moment, until the crowns of the species are known
+        distance = suggestion(settings, crown_to_draw)  # None for a moment, until the crowns of the species are known
         unit, length = settings.id_data.unit_settings, "…"
-        if found is not None:
-            length = units.to_string(unit.system, 'LENGTH', found * unit.scale_length, precision=2)
+        if distance is not None:
+            length = units.to_string(unit.system, 'LENGTH', distance * unit.scale_length, precision=2)
         base.draw_below(layout, length)
     else:
         layout.prop(settings, "min_distance", text=" ")

@@ -66,13 +66,13 @@ def _draw(self: TetFloraPreferences, context: bpy.types.Context) -> None:
     _draw_keys(layout.column(), context)
 
 
-def _draw_cache(column: bpy.types.UILayout, own: TetFloraPreferences) -> None:
+def _draw_cache(column: bpy.types.UILayout, prefs: TetFloraPreferences) -> None:
     if CACHE_VARIABLE in os.environ:
         column.label(text=f"{CACHE_VARIABLE} is set: {os.environ[CACHE_VARIABLE]}", icon='INFO')
-    column.prop(own, "use_cache")
+    column.prop(prefs, "use_cache")
     row = column.row()
-    row.active = own.use_cache
-    row.prop(own, "cache_folder")
+    row.active = prefs.use_cache
+    row.prop(prefs, "cache_folder")
     Button("delete_file", 'NONE', "Clear Cache", {"cache": True}).draw(column)
     if storage.last_problem():
         column.label(text=storage.last_problem(), icon='ERROR')

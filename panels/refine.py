@@ -41,13 +41,13 @@ def TETFLORA_PT_refine(layout: bpy.types.UILayout, context: bpy.types.Context) -
     Button("daylight", 'LIGHT_SUN').draw(row)
 
 
-def _draw_warnings(row: bpy.types.UILayout, found: list[Warned]) -> None:
+def _draw_warnings(row: bpy.types.UILayout, warnings: list[Warned]) -> None:
     """The first warning with what mends it, and how many there are: always one line."""
-    if not found:
+    if not warnings:
         row.label(text="Nothing to mend", icon='CHECKMARK')
         return
-    first = found[0]
-    more = f" (+{len(found) - 1})" if len(found) > 1 else ""
+    first = warnings[0]
+    more = f" (+{len(warnings) - 1})" if len(warnings) > 1 else ""
     row = row.split(factor=0.55, align=True)
     row.label(text=first.short + more, icon='ERROR')
     row = row.row(align=True)

@@ -88,8 +88,8 @@ class Arrays:
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         """The same again."""
-        own = {n: value.array() if isinstance(value, _Components) else value for n, value in state.items()}
-        vars(self).update(own)
+        attributes = {n: value.array() if isinstance(value, _Components) else value for n, value in state.items()}
+        vars(self).update(attributes)
 
     def __len__(self) -> int:
         return next(len(c) for c in vars(self).values() if isinstance(c, np.ndarray | Arrays))
@@ -118,8 +118,8 @@ class Arrays:
         """All things of several in one; what is not a column comes from the first part."""
         if not parts:
             return cls.empty()
-        some = [p for p in parts if len(p)]  # what is empty lacks columns that are optional
-        owners = ((name, some if name in _optional(cls) else parts) for name in _names(cls))
+        full = [p for p in parts if len(p)]  # what is empty lacks columns that are optional
+        owners = ((name, full if name in _optional(cls) else parts) for name in _names(cls))
         return cls(*(_joined([getattr(p, name) for p in those]) for name, those in owners))
 
     @classmethod
@@ -297,22 +297,22 @@ class Growing(Generic[Rows]):
     @property
     def rows(self) -> Rows:
         """All things, not a copy: valid until some are appended or exchanged; whoever writes there changes them."""
-        return self._kind(*(own[: self._number] for own in self._columns.values()))
+        return self._kind(*(array[: self._number] for array in self._columns.values()))
 
     @property
     def nbytes(self) -> int:
         """Bytes of all columns, with the room to spare."""
-        return sum(own.nbytes for own in self._columns.values())
+        return sum(array.nbytes for array in self._columns.values())
 
     def append(self, new: Rows) -> None:
         """Put things behind all others."""
         start, self._number = self._number, self._number + len(new)
-        for name, own in self._columns.items():
-            if self._number > len(own):  # one column after the other: only one is there twice
-                wider = np.empty((self._number + self._number // _SPARE, *own.shape[1:]), own.dtype)
-                wider[:start] = own[:start]
-                self._columns[name] = own = wider
-            own[start : self._number] = getattr(new, name)
+        for name, array in self._columns.items():
+            if self._number > len(array):  # one column after the other: only one is there twice
+                wider = np.empty((self._number + self._number // _SPARE, *array.shape[1:]), array.dtype)
+                wider[:start] = array[:start]
+                self._columns[name] = array = wider
+            array[start : self._number] = getattr(new, name)
 
     def exchange(self, gone: Integers, new: Rows) -> None:
         """Drop rows (k,), ascending, and put new things in their places first, then behind all others.
@@ -320,8 +320,8 @@ class Growing(Generic[Rows]):
         Those that stay keep their order, and so do new ones: what is in one order stays so.
         """
         reused = gone[: len(new)]
-        for name, own in self._columns.items():
-            own[reused] = getattr(new, name)[: len(reused)]
+        for name, array in self._columns.items():
+            array[reused] = getattr(new, name)[: len(reused)]
         if len(new) > len(gone):
             self.append(new.take(slice(len(gone), None)))
         elif len(gone) > len(new):
@@ -333,8 +333,8 @@ class Growing(Generic[Rows]):
         kept[gone] = False
         stay = first + np.flatnonzero(kept[first:])
         self._number = first + len(stay)
-        for own in self._columns.values():
-            own[first : self._number] = np.take(own, stay, axis=0)
+        for array in self._columns.values():
+            array[first : self._number] = np.take(array, stay, axis=0)
 
 
 class Chunks(Generic[Rows]):
@@ -364,10 +364,10 @@ class Chunks(Generic[Rows]):
         """Mark and return rows (k,), ascending, none of which is marked."""
         out, start = [], 0
         runs = np.split(rows, np.searchsorted(rows, np.cumsum([len(chunk) for chunk in self._chunks])[:-1]))
-        for (chunk, there), own in zip(self.chunks(), runs, strict=True):
-            if len(own):
-                out.append(chunk.take(own - start))
-                there[own - start] = False
+        for (chunk, kept), run in zip(self.chunks(), runs, strict=True):
+            if len(run):
+                out.append(chunk.take(run - start))
+                kept[run - start] = False
             start += len(chunk)
         self.marked += len(rows)
         return self.kind.concatenate(out or [self._chunks[0].take(slice(0))])
@@ -384,7 +384,7 @@ class Chunks(Generic[Rows]):
     def joined(self) -> Rows:
         """All that is not marked, as the only chunk from now on: rows have new numbers, in the same order."""
         if len(self._chunks) > 1 or self.marked:
-            one = self.kind.concatenate([chunk.take(there) for chunk, there in self.chunks()])
+            one = self.kind.concatenate([chunk.take(kept) for chunk, kept in self.chunks()])
             self._chunks, self._there, self._number, self.marked = [], [], 0, 0
             self.append(one)
         return self._chunks[0]

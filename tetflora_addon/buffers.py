@@ -76,7 +76,7 @@ def concatenate_buffers(parts: Sequence[MeshBuffers]) -> MeshBuffers | None:
         sizes = np.cumsum([0] + [len(getattr(p, offset_by)) for p in parts[:-1]])
         return np.concatenate([getattr(p, name) + np.int32(s) for p, s in zip(parts, sizes, strict=True)])
 
-    every = {name: own for part in reversed(parts) for name, own in part.attributes.items()}
+    every = {name: pair for part in reversed(parts) for name, pair in part.attributes.items()}
     corners = np.cumsum([0] + [len(p.corner_verts) for p in parts]).astype(np.int32)
     starts = [p.face_offsets[:-1] + c for p, c in zip(parts, corners[:-1], strict=True)]
     return MeshBuffers(
@@ -86,7 +86,7 @@ def concatenate_buffers(parts: Sequence[MeshBuffers]) -> MeshBuffers | None:
         corner_edges=joined("corner_edges", "edge_verts"),
         face_offsets=np.concatenate([*starts, corners[-1:]]),
         attributes={
-            name: (own[0], np.concatenate([_values(p, name, *own) for p in parts])) for name, own in every.items()
+            name: (pair[0], np.concatenate([_values(p, name, *pair) for p in parts])) for name, pair in every.items()
         },
         smooth=parts[0].smooth,
     )
@@ -113,15 +113,15 @@ def kept_faces(mesh: MeshBuffers, kept: Mask) -> MeshBuffers:
     verts, edges = np.zeros(len(mesh.positions), bool), np.zeros(len(mesh.edge_verts), bool)
     verts[mesh.corner_verts[corner]] = True
     edges[mesh.corner_edges[corner]] = True
-    vert, edge = (np.cumsum(some, dtype=np.int32) - np.int32(1) for some in (verts, edges))
-    some = {"POINT": np.flatnonzero(verts), "FACE": np.flatnonzero(kept), "CORNER": corner}
+    vert, edge = (np.cumsum(needed, dtype=np.int32) - np.int32(1) for needed in (verts, edges))
+    needed = {"POINT": np.flatnonzero(verts), "FACE": np.flatnonzero(kept), "CORNER": corner}
     return MeshBuffers(
-        positions=mesh.positions[some["POINT"]],
+        positions=mesh.positions[needed["POINT"]],
         edge_verts=vert[mesh.edge_verts[edges]],
         corner_verts=vert[mesh.corner_verts[corner]],
         corner_edges=edge[mesh.corner_edges[corner]],
         face_offsets=np.concatenate([[0], np.cumsum(size[kept])]).astype(np.int32),
-        attributes={name: (domain, values[some[domain]]) for name, (domain, values) in mesh.attributes.items()},
+        attributes={name: (domain, values[needed[domain]]) for name, (domain, values) in mesh.attributes.items()},
         smooth=mesh.smooth,
         species=mesh.species,
     )

@@ -57,8 +57,8 @@ def total() -> int | None:
     """Bytes of memory that this machine has, or that the container in which it runs may use; None if not known."""
     ask = {"win32": _windows_total, "darwin": _mac_total}.get(sys.platform, _unix_total)
     with suppress(OSError, ValueError, AttributeError):
-        found = ask()
-        return found if found > 0 else None
+        size = ask()
+        return size if size > 0 else None
     return None
 
 
@@ -66,8 +66,8 @@ def resident() -> int | None:
     """Bytes of memory that this process takes now; None if not known."""
     ask = {"win32": _windows_resident, "darwin": _mac_resident}.get(sys.platform, _unix_resident)
     with suppress(OSError, ValueError, AttributeError, ImportError):
-        found = ask()
-        return found if found > 0 else None
+        size = ask()
+        return size if size > 0 else None
     return None
 
 
@@ -131,22 +131,22 @@ def _unix_total() -> int:
 
 def _container_limits() -> list[int]:
     """Limits of the control groups that this process is in, of both versions; groups within groups have several."""
-    found: list[int] = []
+    limits: list[int] = []
     try:
         groups = [line.split(":", 2) for line in _OWN_GROUPS.read_text(encoding="utf-8").splitlines()]
     except OSError:
-        return found
+        return limits
     for group in groups:
         if len(group) != 3 or (group[1] and "memory" not in group[1].split(",")):
             continue
         root, name = (_CGROUPS / "memory", "memory.limit_in_bytes") if group[1] else (_CGROUPS, "memory.max")
-        own = root / group[2].lstrip("/")
-        for folder in (own, *own.parents):
+        innermost = root / group[2].lstrip("/")
+        for folder in (innermost, *innermost.parents):
             with suppress(OSError, ValueError):  # a group without a limit has the word max, the topmost no file
-                found.append(int((folder / name).read_text(encoding="utf-8")))
+                limits.append(int((folder / name).read_text(encoding="utf-8")))
             if folder == root:
                 break
-    return found
+    return limits
 
 
 def _unix_resident() -> int:
@@ -166,8 +166,8 @@ def _mac_total() -> int:
 
 def _mac_resident() -> int:
     system, task, count = ctypes.CDLL(None), _Task(), c_uint32(sizeof(_Task) // 4)
-    own = c_uint32.in_dll(system, "mach_task_self_")
-    return 0 if system.task_info(own, _TASK_BASIC_INFO, byref(task), byref(count)) else task.resident_size
+    port = c_uint32.in_dll(system, "mach_task_self_")
+    return 0 if system.task_info(port, _TASK_BASIC_INFO, byref(task), byref(count)) else task.resident_size
 
 
 def _windows_total() -> int:
@@ -177,5 +177,5 @@ def _windows_total() -> int:
 
 def _windows_resident() -> int:
     kernel, counters = ctypes.windll.kernel32, _Counters(length=sizeof(_Counters))
-    own = ctypes.c_void_p(-1)  # what GetCurrentProcess returns
-    return counters.working_set if kernel.K32GetProcessMemoryInfo(own, byref(counters), counters.length) else 0
+    process = ctypes.c_void_p(-1)  # what GetCurrentProcess returns
+    return counters.working_set if kernel.K32GetProcessMemoryInfo(process, byref(counters), counters.length) else 0

@@ -243,17 +243,17 @@ def memoized(most_bytes: int) -> Callable[[Callable[..., Arrays]], Callable[...,
                 content.update(f"{array.dtype}{array.shape}".encode())
                 content.update(np.ascontiguousarray(array))
             key = content.digest()
-            found = kept.pop(key, None)
-            if found is None:
-                found = tuple(np.array(result) for result in function(*given))
-                for result in found:
+            results = kept.pop(key, None)
+            if results is None:
+                results = tuple(np.array(result) for result in function(*given))
+                for result in results:
                     result.flags.writeable = False
-            if _size(found) > most_bytes:
-                return found
-            kept[key] = found
+            if _size(results) > most_bytes:
+                return results
+            kept[key] = results
             while sum(map(_size, kept.values())) > most_bytes:
                 del kept[next(iter(kept))]
-            return found
+            return results
 
         return memo
 

@@ -137,8 +137,8 @@ class Asset:
     def faces_of(self, cluster: int) -> tuple[Integers32, Integers32]:
         """Parts (k,) and faces (k,) of a cluster."""
         start = int(self.clusters.first_face[cluster])
-        some = slice(start, start + int(self.clusters.faces[cluster]))
-        return self.part[some], self.face[some]
+        run = slice(start, start + int(self.clusters.faces[cluster]))
+        return self.part[run], self.face[run]
 
     def leaves_of(self, cluster: int) -> AssetKites:
         """Leaves (k,) of a cluster."""
@@ -161,11 +161,11 @@ class AssetTable:
         root = np.cumsum([0, *(len(a.clusters) for a in assets)])
         sample = np.cumsum([0, *(len(a.samples) for a in assets)])
         moved = []
-        for asset, first, at in zip(assets, root[:-1].tolist(), sample[:-1].tolist(), strict=True):
-            own, cluster, number = asset.clusters, np.int32(first), np.int32(at)
-            parent = np.where(own.parent < 0, own.parent, own.parent + cluster)
-            samples = {"leaf_sample": own.leaf_sample + number, "wood_sample": own.wood_sample + number}
-            moved.append(replace(own, parent=parent, child=own.child + cluster, **samples))
+        for asset, first, before in zip(assets, root[:-1].tolist(), sample[:-1].tolist(), strict=True):
+            clusters, cluster, number = asset.clusters, np.int32(first), np.int32(before)
+            parent = np.where(clusters.parent < 0, clusters.parent, clusters.parent + cluster)
+            samples = {"leaf_sample": clusters.leaf_sample + number, "wood_sample": clusters.wood_sample + number}
+            moved.append(replace(clusters, parent=parent, child=clusters.child + cluster, **samples))
         samples = SurfaceSamples.concatenate([a.samples for a in assets])
         return cls(tuple(assets), Clusters.concatenate(moved), samples, root)
 

@@ -43,7 +43,7 @@ def keep(asset: Asset) -> None:
     if path is None:
         return
     every = ((name, f.name) for name, kind in _KINDS.items() for f in fields(kind))
-    columns = {f"{name}.{own}": getattr(getattr(asset, name), own) for name, own in every}
+    columns = {f"{name}.{column}": getattr(getattr(asset, name), column) for name, column in every}
     columns |= {"name": np.array(asset.name), "digest": np.array(asset.digest), "part": asset.part, "face": asset.face}
     storage.write_arrays(path, _NAMES, _MOST_FILES, **columns)
 
@@ -79,8 +79,8 @@ def _path(digest: str) -> Path | None:
 
 def _read(path: Path, digest: str) -> Asset | None:
     def checked(stored: Mapping[str, NDArray]) -> Asset:
-        made = [kind(*(stored[f"{name}.{f.name}"] for f in fields(kind))) for name, kind in _KINDS.items()]
-        asset = Asset(str(stored["name"]), str(stored["digest"]), *made, stored["part"], stored["face"])
+        arrays = [kind(*(stored[f"{name}.{f.name}"] for f in fields(kind))) for name, kind in _KINDS.items()]
+        asset = Asset(str(stored["name"]), str(stored["digest"]), *arrays, stored["part"], stored["face"])
         _check(asset, digest)
         return asset
 
@@ -92,17 +92,17 @@ def _check(asset: Asset, digest: str) -> None:
     for kind, rows in ((Clusters, asset.clusters), (SurfaceSamples, asset.samples), (AssetKites, asset.leaves)):
         model = kind.empty()
         for f in fields(kind):
-            own, wanted = getattr(rows, f.name), getattr(model, f.name)
-            if own.dtype != wanted.dtype or own.shape[1:] != wanted.shape[1:] or len(own) != len(rows):
+            column, wanted = getattr(rows, f.name), getattr(model, f.name)
+            if column.dtype != wanted.dtype or column.shape[1:] != wanted.shape[1:] or len(column) != len(rows):
                 raise ValueError(f.name)
-            if own.dtype.kind == "f" and not np.isfinite(own).all():
+            if column.dtype.kind == "f" and not np.isfinite(column).all():
                 raise ValueError(f.name)
     clusters, count = asset.clusters, len(asset.clusters)
     runs = [(clusters.child, clusters.children, count), (clusters.first_face, clusters.faces, asset.faces)]
     runs += [(clusters.leaf_sample, clusters.leaf_samples, len(asset.samples))]
     runs += [(clusters.wood_sample, clusters.wood_samples, len(asset.samples))]
     runs += [(clusters.first_leaf, clusters.leaves, len(asset.leaves))]
-    numbers = [*(own for first, number, _ in runs for own in (first, number)), asset.part, asset.face]
+    numbers = [*(column for first, number, _ in runs for column in (first, number)), asset.part, asset.face]
     sound = (
         count > 0
         and asset.digest == digest

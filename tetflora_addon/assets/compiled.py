@@ -45,23 +45,23 @@ def _facet_weights(
         depth = deeper
     weights = np.ones((len(clusters), len(COUNTS)))
     for level in range(int(depth.max()) + 1):
-        own = np.flatnonzero((depth == level) & (clusters.optical_area > 0.0))
-        some = own[np.unique((np.arange(CLUSTERS) + 0.5) * len(own) // CLUSTERS).astype(np.int64)] if len(own) else own
-        found = np.zeros((2, len(COUNTS), len(TRIED)))
-        for cluster in some.tolist():
-            found += _looked(clusters, samples, cluster, triangles(cluster))
-        weights[depth == level] = _fitting(found)
+        leafy = np.flatnonzero((depth == level) & (clusters.optical_area > 0.0))
+        picks = np.unique((np.arange(CLUSTERS) + 0.5) * len(leafy) // CLUSTERS).astype(np.int64)
+        sums = np.zeros((2, len(COUNTS), len(TRIED)))
+        for cluster in leafy[picks[: len(leafy)]].tolist():
+            sums += _looked(clusters, samples, cluster, triangles(cluster))
+        weights[depth == level] = _fitting(sums)
         yield 0.85 + 0.15 * (level + 1) / (int(depth.max()) + 1)
     return weights
 
 
-def _fitting(found: Floats) -> Floats:
+def _fitting(areas: Floats) -> Floats:
     """Weights (counts,) with which facets block as much: areas (2, counts, tried) of the cluster, and of its facets."""
-    wanted, made = found
+    wanted, shade = areas
     out = np.ones(len(COUNTS))
     for k in range(len(COUNTS)):
-        if made[k].max() > 0.0:
-            out[k] = np.interp(wanted[k, 0], made[k], TRIED, left=TRIED[0] * wanted[k, 0] / max(made[k, 0], 1e-300))
+        if shade[k].max() > 0.0:
+            out[k] = np.interp(wanted[k, 0], shade[k], TRIED, left=TRIED[0] * wanted[k, 0] / max(shade[k, 0], 1e-300))
         blocked = wanted[k, 0] * RAYS**2
         out[k] = (blocked * out[k] + SURE) / (blocked + SURE)
     return np.clip(out, 0.1, 1.0)
@@ -98,10 +98,10 @@ def _looked(clusters: Clusters, samples: SurfaceSamples, cluster: int, runs: Ite
     for run in runs:
         # Both sides of what is closed count: it is either that blocks a ray.
         light = np.log(np.maximum(1.0 - run.coverage.astype(np.float64), 1e-12))
-        for own, view in zip(through, views, strict=True):
+        for per_ray, view in zip(through, views, strict=True):
             triangle, ray = view.met(run.corners)
             inside = np.flatnonzero(((ray >= 0) & (ray < RAYS)).all(axis=1))
-            own += np.bincount(ray[inside, 0] * RAYS + ray[inside, 1], light[triangle[inside]], RAYS * RAYS)
+            per_ray += np.bincount(ray[inside, 0] * RAYS + ray[inside, 1], light[triangle[inside]], RAYS * RAYS)
     out = np.zeros((2, len(COUNTS), len(TRIED)))
     out[0] = float((1.0 - np.exp(through)).sum()) / RAYS**2
     for k, count in enumerate(COUNTS):
@@ -239,8 +239,8 @@ def _samples_above(
     for kind in range(2):
         owner, rank = well_spread(wanted[:, kind])
         key = child_key(key_of_seed(inner[owner] + (kind << 32)), rank)
-        at = (rank + uniform(key, ALONG)) / np.maximum(wanted[:, kind], 1)[owner]
-        place = done[first[inner], kind][owner] + within[owner, kind] * at
+        fraction = (rank + uniform(key, ALONG)) / np.maximum(wanted[:, kind], 1)[owner]
+        place = done[first[inner], kind][owner] + within[owner, kind] * fraction
         smallest = np.clip(np.searchsorted(done[:, kind], place, side="right") - 1, 0, len(areas) - 1)
         inside = (place - done[smallest, kind]) / np.maximum(areas[smallest, kind], 1e-300)
         many = counts[smallest, kind]

@@ -66,17 +66,17 @@ def patch_table_of(source: AssetSource, patches: tuple[Patches | None, ...]) -> 
     part, patch = spread(np.array([0 if p is None else len(p) for p in patches])[source.surface])
     center, triangles = np.zeros((len(part), 3), np.float32), np.zeros(len(part), np.int32)
     solid, (island, share, width) = np.zeros(len(part), bool), np.zeros((3, len(part)))
-    for s, own in enumerate(patches):
-        at = np.flatnonzero(source.surface[part] == s)
-        if own is not None and len(at):
-            matrix = source.matrices[part[at]].astype(np.float32)
-            center[at] = np.einsum("nij,nj->ni", matrix[:, :3, :3], own.center[patch[at]]) + matrix[:, :3, 3]
-            triangles[at] = np.diff(own.first)[patch[at]]
-            solid[at] = own.solid[patch[at]]
+    for s, of_surface in enumerate(patches):
+        rows = np.flatnonzero(source.surface[part] == s)
+        if of_surface is not None and len(rows):
+            matrix = source.matrices[part[rows]].astype(np.float32)
+            center[rows] = np.einsum("nij,nj->ni", matrix[:, :3, :3], of_surface.center[patch[rows]]) + matrix[:, :3, 3]
+            triangles[rows] = np.diff(of_surface.first)[patch[rows]]
+            solid[rows] = of_surface.solid[patch[rows]]
             scale = np.cbrt(np.abs(np.linalg.det(matrix[:, :3, :3])))
-            island[at], width[at] = own.island[patch[at]] * scale**2, own.width[patch[at]] * scale
+            island[rows], width[rows] = of_surface.island[patch[rows]] * scale**2, of_surface.width[patch[rows]] * scale
             # An island is as many patches as it is cut into.
-            share[at] = island[at] / np.maximum(np.round(own.pieces[patch[at]]), 1)
+            share[rows] = island[rows] / np.maximum(np.round(of_surface.pieces[patch[rows]]), 1)
     woody = solid & (island > _WOOD * share.sum())
     thick = woody & (width > _THICK * width.max(initial=0.0, where=woody))
     kind = (woody.astype(np.int8) + thick).astype(np.int8)
@@ -111,38 +111,38 @@ def runs_of(
     done = np.concatenate([[0], np.cumsum(pool.triangles[hierarchy.order], dtype=np.int64)])
     load = done[hierarchy.last[small]] - done[hierarchy.first[small]]
     for run in chunks(load, BATCH):
-        own = small[run]
-        of, index = spread(hierarchy.last[own] - hierarchy.first[own])
-        yield _run(source, pool, hierarchy.order[hierarchy.first[own][of] + index], first + run.start + of)
+        clusters = small[run]
+        of, index = spread(hierarchy.last[clusters] - hierarchy.first[clusters])
+        yield _run(source, pool, hierarchy.order[hierarchy.first[clusters][of] + index], first + run.start + of)
 
 
-def _run(source: AssetSource, pool: PatchTable, some: Integers, cluster: Integers) -> Run:
+def _run(source: AssetSource, pool: PatchTable, patches: Integers, cluster: Integers) -> Run:
     """Triangles of some patches (k,), each of a cluster (k,)."""
-    of, index = spread(pool.triangles[some])
-    part, woody = pool.part[some][of], pool.woody[some][of]
+    of, index = spread(pool.triangles[patches])
+    part, woody = pool.part[patches][of], pool.woody[patches][of]
     run = replace(Run.zeros(len(of)), cluster=cluster[of], part=part, new_patch=index == 0, woody=woody)
     surface, color, transmission = source.surface[part], run.color, run.transmission
     for s in np.unique(surface):
-        at = np.flatnonzero(surface == s)
-        own, shown = pool.patches[s], source.surfaces[s]
-        patch = pool.patch[some][of[at]]
-        triangle = own.triangle[own.first[patch] + index[at]]
-        matrix = source.matrices[part[at]]
+        rows = np.flatnonzero(surface == s)
+        of_surface, shown = pool.patches[s], source.surfaces[s]
+        patch = pool.patch[patches][of[rows]]
+        triangle = of_surface.triangle[of_surface.first[patch] + index[rows]]
+        matrix = source.matrices[part[rows]]
         local = shown.positions[shown.triangles[triangle]].astype(np.float64)
         # By component: numpy multiplies small matrices one by one.
         for i in range(3):
             along = sum(matrix[:, i, k, None] * local[:, :, k] for k in range(3))
-            run.corners[at, :, i] = along + matrix[:, i, 3, None]
-        run.face[at] = of_face = shown.face[triangle]
-        color[at], run.coverage[at] = shown.color[of_face], shown.coverage[of_face]
-        run.roughness[at] = _ROUGHNESS if shown.roughness is None else shown.roughness[of_face]
-        run.solid[at] = solid = own.solid[patch]
+            run.corners[rows, :, i] = along + matrix[:, i, 3, None]
+        run.face[rows] = of_face = shown.face[triangle]
+        color[rows], run.coverage[rows] = shown.color[of_face], shown.coverage[of_face]
+        run.roughness[rows] = _ROUGHNESS if shown.roughness is None else shown.roughness[of_face]
+        run.solid[rows] = solid = of_surface.solid[patch]
         through = shown.transmission[of_face].astype(np.float32)
         unknown = np.where(solid, np.float32(0.0), np.float32(_SHEET_TRANSMISSION))
-        transmission[at] = np.where(np.isnan(through), unknown, through)
-        both = at[solid & ~woody[at]]  # a facet or a kite is one sheet in place of the two sides of a closed leaf
+        transmission[rows] = np.where(np.isnan(through), unknown, through)
+        both = rows[solid & ~woody[rows]]  # a facet or a kite is one sheet in place of the two sides of a closed leaf
         color[both], transmission[both] = through_both_sides(color[both], transmission[both])
-        run.width[at] = own.width[patch] * np.cbrt(np.abs(np.linalg.det(matrix[:, :3, :3])))
+        run.width[rows] = of_surface.width[patch] * np.cbrt(np.abs(np.linalg.det(matrix[:, :3, :3])))
     return replace(run, new_face=(np.diff(run.face, prepend=-1) != 0) | (np.diff(part, prepend=-1) != 0))
 
 
@@ -187,12 +187,12 @@ def measured(run: Run) -> Measured:
 
 def _leaves(run: Run, optical: Floats, normal: Floats) -> AssetKites:
     """Patches that are not wood, as kites; triangles have optical areas (t,), m², and normals (t, 3)."""
-    some = np.flatnonzero(~run.woody)
-    if not len(some):
+    leafy = np.flatnonzero(~run.woody)
+    if not len(leafy):
         return AssetKites.empty()
-    corners, optical, normal, new = run.corners[some], optical[some], normal[some], run.new_patch[some]
+    corners, optical, normal, new = run.corners[leafy], optical[leafy], normal[leafy], run.new_patch[leafy]
     first, leaf = np.flatnonzero(new), np.cumsum(new) - 1
-    cluster = run.cluster[some[first]]
+    cluster = run.cluster[leafy[first]]
     number = cluster * _MANY + np.arange(len(first)) - np.searchsorted(cluster, cluster)
     area = np.add.reduceat(optical, first)
     whole = np.maximum(area, 1e-300)[:, None]
@@ -206,12 +206,12 @@ def _leaves(run: Run, optical: Floats, normal: Floats) -> AssetKites:
     spread = np.zeros((len(first), 3, 3))
     for i in range(3):
         for j in range(i, 3):
-            own = (away[:, :, i] * away[:, :, j]).sum(axis=1) / 12.0
-            spread[:, i, j] = spread[:, j, i] = np.add.reduceat(optical * own, first) / whole[:, 0]
+            moment = (away[:, :, i] * away[:, :, j]).sum(axis=1) / 12.0
+            spread[:, i, j] = spread[:, j, i] = np.add.reduceat(optical * moment, first) / whole[:, 0]
     values, vectors = np.linalg.eigh(spread)
     done = np.cumsum(optical)
-    at = (done - optical)[first] + uniform(key_of_seed(number), _PLANE) * area
-    pick = np.clip(np.searchsorted(done, at, side="right"), first, np.append(first[1:], len(optical)) - 1)
+    place = (done - optical)[first] + uniform(key_of_seed(number), _PLANE) * area
+    pick = np.clip(np.searchsorted(done, place, side="right"), first, np.append(first[1:], len(optical)) - 1)
     plane, long = normal[pick], vectors[:, :, 2]
     along = long - np.einsum("ni,ni->n", long, plane)[:, None] * plane
     flat = np.linalg.norm(along, axis=1) < 0.1  # a face across the leaf, as of its rim: any direction will do
@@ -221,8 +221,8 @@ def _leaves(run: Run, optical: Floats, normal: Floats) -> AssetKites:
     side = np.sqrt(area)
     length = np.clip(length, side * np.sqrt(2.0 / _WIDE), side * np.sqrt(2.0 / _NARROW))
     width = 2.0 * area / np.maximum(length, 1e-300)
-    mean = np.add.reduceat(optical[:, None] * run.color[some], first, axis=0) / whole
-    looks = (np.add.reduceat(optical * own[some], first) / whole[:, 0] for own in (run.transmission, run.roughness))
+    mean = np.add.reduceat(optical[:, None] * run.color[leafy], first, axis=0) / whole
+    looks = (np.add.reduceat(optical * look[leafy], first) / whole[:, 0] for look in (run.transmission, run.roughness))
     along, across = length[:, None] / 2 * along, width[:, None] / 2 * np.cross(plane, along)
     return AssetKites.typed(center, along, across, mean, *looks)
 
@@ -249,24 +249,24 @@ def _samples(
     kinds = [np.where(run.woody, 0.0, optical), np.where(run.woody, optical, 0.0)]
     areas = [np.add.reduceat(kind, start) for kind in kinds]
     counts = shared_out(*areas, SAMPLES)
-    made, order = [], []
+    samples, order = [], []
     for kind, area, count in zip(kinds, areas, counts.T, strict=True):
         cluster, rank = well_spread(count)
         key = child_key(key_of_seed(run.cluster[start][cluster]), rank)
         done = np.cumsum(kind)
         before = (done - kind)[start]
-        at = before[cluster] + area[cluster] * (rank + uniform(key, ALONG)) / np.maximum(count, 1)[cluster]
-        pick = np.minimum(np.searchsorted(done, at, side="right"), len(kind) - 1)
+        target = before[cluster] + area[cluster] * (rank + uniform(key, ALONG)) / np.maximum(count, 1)[cluster]
+        pick = np.minimum(np.searchsorted(done, target, side="right"), len(kind) - 1)
         # Rounding may lead to a neighbor of another cluster or kind.
         pick = np.clip(pick, start[cluster], np.append(start[1:], len(kind))[cluster] - 1)
         root, v = np.sqrt(uniform(key, _U)), uniform(key, _V)
         weight = np.stack([1 - root, root * (1 - v), root * v], axis=1)
         place = np.einsum("nk,nki->ni", weight, run.corners[pick])
-        look = (own[pick] for own in (normal, run.color, run.transmission, run.roughness))
-        made.append(SurfaceSamples.typed(place, *look))
+        look = (array[pick] for array in (normal, run.color, run.transmission, run.roughness))
+        samples.append(SurfaceSamples.typed(place, *look))
         order.append(cluster)
     cluster = np.concatenate(order)
-    return SurfaceSamples.concatenate(made).take(np.argsort(cluster, kind="stable")), counts
+    return SurfaceSamples.concatenate(samples).take(np.argsort(cluster, kind="stable")), counts
 
 
 def through_both_sides(

@@ -121,9 +121,9 @@ def _mean_curvature(
     sine, cosine = np.linalg.norm(np.cross(normal[a], normal[b]), axis=1), np.einsum("ni,ni->n", normal[a], normal[b])
     angle = np.arctan2(sine, cosine)
     bulge = np.einsum("ni,ni->n", normal[a] - normal[b], center[a] - center[b])
-    own = 0.25 * length * angle * np.sign(bulge)  # half of ½ l θ to either face
-    own[(area[a] <= 0) | (area[b] <= 0)] = 0.0
-    integral = np.bincount(a, own, faces) + np.bincount(b, own, faces)
+    bend = 0.25 * length * angle * np.sign(bulge)  # half of ½ l θ to either face
+    bend[(area[a] <= 0) | (area[b] <= 0)] = 0.0
+    integral = np.bincount(a, bend, faces) + np.bincount(b, bend, faces)
     around, weight = area.copy(), 1.0 + np.bincount(a, minlength=faces) + np.bincount(b, minlength=faces)
     for _ in range(_ROUNDS):
         integral, around = (
@@ -172,9 +172,9 @@ def patches_of(surface: AssetSurface) -> Patches:
     start = np.flatnonzero(new_island)
     count = np.bincount(np.cumsum(new_island) - 1, new_face).astype(np.int64)
     if (count > MOST_FACES).any():
-        at, sorted_ = _along_a_curve(surface, triangle, new_island, count > MOST_FACES)
-        for own in (triangle, solid, width):
-            own[at] = own[sorted_]
+        places, sorted_ = _along_a_curve(surface, triangle, new_island, count > MOST_FACES)
+        for column in (triangle, solid, width):
+            column[places] = column[sorted_]
         new_face = np.diff(surface.face[triangle], prepend=-1) != 0
     number = np.cumsum(new_face) - np.cumsum(new_face)[start][np.cumsum(new_island) - 1]
     most = -(-count // np.ceil(count / MOST_FACES).astype(np.int64))
@@ -246,14 +246,14 @@ def _along_a_curve(
     """
     start = np.append(np.flatnonzero(new_island), len(triangle))
     owner, index = spread(np.diff(start)[large])
-    at = start[:-1][large][owner] + index
-    corners = surface.positions[surface.triangles[triangle[at]]].mean(axis=1, dtype=np.float32)
-    face = surface.face[triangle[at]]
+    places = start[:-1][large][owner] + index
+    corners = surface.positions[surface.triangles[triangle[places]]].mean(axis=1, dtype=np.float32)
+    face = surface.face[triangle[places]]
     # All triangles of a face go where its first one is.
-    corners = corners[np.maximum.accumulate(np.where(np.diff(face, prepend=-1) != 0, np.arange(len(at)), 0))]
+    corners = corners[np.maximum.accumulate(np.where(np.diff(face, prepend=-1) != 0, np.arange(len(places)), 0))]
     low = corners.min(axis=0)
     cell = (corners - low) / max(float((corners.max(axis=0) - low).max()), 1e-30) * ((1 << _BITS) - 1)
-    code = np.zeros(len(at), np.int64)
+    code = np.zeros(len(places), np.int64)
     for axis in range(3):
         # Bits of numbers (n,) below 1,024 with two zeros between them.
         value = cell[:, axis].astype(np.int64)
@@ -261,7 +261,7 @@ def _along_a_curve(
         value = (value | value << 8) & 0x0300F00F
         value = (value | value << 4) & 0x030C30C3
         code |= ((value | value << 2) & 0x09249249) << axis
-    return at, at[np.lexsort([face, code, owner])]
+    return places, places[np.lexsort([face, code, owner])]
 
 
 #: Triangles up to which a cluster has no children.
@@ -331,8 +331,8 @@ def _divided(
     """Divide runs (r,) of the order in two where they are large; new order, runs, and where each comes from."""
     size = high - low
     owner, within = spread(size)
-    at = low[owner] + within
-    patch = order[at]
+    index = low[owner] + within
+    patch = order[index]
     weight = triangles[patch].astype(np.float64)
     begin = np.cumsum(size) - size
     load = np.add.reduceat(weight, begin)
@@ -348,7 +348,7 @@ def _divided(
     place = np.where(dividing[owner], (along - least[owner, axis[owner]]) / span[owner], 0.0)
     sorted_ = np.argsort(2 * owner + np.clip(place, 0.0, 1.0), kind="stable")
     order = order.copy()
-    order[at] = patch[sorted_]
+    order[index] = patch[sorted_]
     before = np.cumsum(weight[sorted_]) - weight[sorted_] - (np.cumsum(load) - load)[owner]
     half = np.bincount(owner, before < load[owner] / 2, len(low)).astype(np.int64)
     half = np.clip(half, 1, np.maximum(size - 1, 1))

@@ -136,9 +136,9 @@ def _matrix_now(obj: Object, depsgraph: Depsgraph) -> Floats:
     evaluated = obj.evaluated_get(depsgraph)
     if evaluated.is_evaluated:
         return np.array(evaluated.matrix_world)
-    own = np.array(obj.matrix_basis)
+    basis = np.array(obj.matrix_basis)
     parent = obj.parent
-    return own if parent is None else _matrix_now(parent, depsgraph) @ np.array(obj.matrix_parent_inverse) @ own
+    return basis if parent is None else _matrix_now(parent, depsgraph) @ np.array(obj.matrix_parent_inverse) @ basis
 
 
 def is_animated(datablock: ID | None) -> bool:

@@ -45,8 +45,8 @@ class Pictures:
 
 def file_of(folders: Iterable[Path], identifier: str, ending: str = ENDING) -> Path | None:
     """The first file of an identifier in some folders, if there is one."""
-    found = (folder / (identifier + ending) for folder in folders) if is_identifier(identifier) else ()
-    return next((path for path in found if is_regular(path)), None)
+    paths = (folder / (identifier + ending) for folder in folders) if is_identifier(identifier) else ()
+    return next((path for path in paths if is_regular(path)), None)
 
 
 @dataclass(frozen=True)

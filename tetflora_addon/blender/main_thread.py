@@ -45,9 +45,9 @@ class _Change(Future[_Result]):
         if not self.set_running_or_notify_cancel():
             return
         try:
-            made = self._function()
+            result = self._function()
             sync_view_layers()
-            self.set_result(made)
+            self.set_result(result)
         except BaseException as error:  # raised again where it was asked for
             if not self._waits:
                 traceback.print_exc()

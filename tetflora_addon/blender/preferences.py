@@ -26,11 +26,11 @@ QUALITY_ITEMS = (
 
 def _use_cache(_preferences: object = None, _context: object = None) -> None:
     """Use the cache folder of the environment or the preferences, or none."""
-    chosen, own = os.environ.get(CACHE_VARIABLE, ""), preferences()
+    chosen, prefs = os.environ.get(CACHE_VARIABLE, ""), preferences()
     if chosen:
         storage.set_folder(None if chosen.lower() == "off" else Path(chosen).absolute())
     else:
-        used = own is not None and own.use_cache
+        used = prefs is not None and prefs.use_cache
         storage.set_folder((_chosen("cache") or _cache_folder()) if used else None)
 
 

@@ -41,8 +41,8 @@ def report_text(scene: bpy.types.Scene) -> str:
         "Last error": _error(),
     }
     lines = ["TetFlora report. It holds nothing of your scene; look through it before you send it."]
-    for heading, found in parts.items():
-        lines += ["", f"## {heading}", *found]
+    for heading, entries in parts.items():
+        lines += ["", f"## {heading}", *entries]
     return "\n".join(lines) + "\n"
 
 

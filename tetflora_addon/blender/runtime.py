@@ -166,11 +166,11 @@ class Outlook(Generic[_Result]):
         return self._found.get(key)
 
     def _all(self, shown: list[tuple[bpy.types.Scene, bpy.types.ViewLayer]]) -> Generator:
-        found = {}
+        results = {}
         for scene, layer in shown:
             one = self._find(scene, layer)
-            found[scene.session_uid, layer.name] = (yield from one) if isinstance(one, Generator) else one
-        return found
+            results[scene.session_uid, layer.name] = (yield from one) if isinstance(one, Generator) else one
+        return results
 
     def _look(self) -> float | None:
         shown = [(window.scene, window.view_layer) for window in bpy.context.window_manager.windows]
@@ -179,22 +179,22 @@ class Outlook(Generic[_Result]):
             return self._pause
         if self._steps is None:
             self._steps, self._shown, self._changed, self._longest = self._all(shown), shown, False, 0.0
-        begin, found = time.perf_counter(), None
+        begin, results = time.perf_counter(), None
         try:
             while time.perf_counter() - begin < _SLICE:
                 next(self._steps)
         except StopIteration as stop:
-            found, self._steps = stop.value, None
+            results, self._steps = stop.value, None
         except ReferenceError:  # deleted, which Blender tells soon
             self._changed = True
         now = time.perf_counter()
         self._longest = max(self._longest, now - begin)
-        if found is None:
+        if results is None:
             return _SLICE
         self._at, self._took = now, (self._took[1], self._longest)
         self._pause = max(_QUIET, 30.0 * min(self._took))
-        if found != self._found:
-            self._found = found
+        if results != self._found:
+            self._found = results
             redraw('UI')  # where panels are: views take seconds without a graphics card
         return None
 
@@ -361,8 +361,8 @@ def guarded(data: JobData, steps: Generator[Any, Any, _Result]) -> Generator[Any
     GoneError
         Something is gone, or somebody stopped the job.
     """
-    own, sent, waits = (data, steps), None, False
-    _running.append(own)
+    entry, sent, waits = (data, steps), None, False
+    _running.append(entry)
     try:
         while True:
             with data.watched(few=waits):
@@ -373,7 +373,7 @@ def guarded(data: JobData, steps: Generator[Any, Any, _Result]) -> Generator[Any
             waits = getattr(item, "waiting", False) or getattr(item, "amid", False)
             sent = yield item
     finally:
-        _running.remove(own)
+        _running.remove(entry)
         steps.close()
 
 

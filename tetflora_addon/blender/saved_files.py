@@ -106,13 +106,13 @@ def _whole(path: Path) -> bool:
 @cache
 def _parts(kind: type[bpy.types.PropertyGroup]) -> tuple[tuple[str, ...], tuple[str, ...], tuple[str, ...]]:
     """Names of a group's stored texts, of groups within it, and of lists of groups."""
-    found: dict[str, list[str]] = {'STRING': [], 'POINTER': [], 'COLLECTION': []}
+    names: dict[str, list[str]] = {'STRING': [], 'POINTER': [], 'COLLECTION': []}
     for prop in kind.bl_rna.properties:
         within = getattr(getattr(prop, "fixed_type", None), "base", None)
         stored = prop.type == 'STRING' and not prop.is_skip_save
-        if stored or (prop.type in found and getattr(within, "identifier", "") == 'PropertyGroup'):
-            found[prop.type].append(prop.identifier)
-    return tuple(found['STRING']), tuple(found['POINTER']), tuple(found['COLLECTION'])
+        if stored or (prop.type in names and getattr(within, "identifier", "") == 'PropertyGroup'):
+            names[prop.type].append(prop.identifier)
+    return tuple(names['STRING']), tuple(names['POINTER']), tuple(names['COLLECTION'])
 
 
 def _clear_unreadable(group: bpy.types.PropertyGroup) -> int:

@@ -51,13 +51,13 @@ def properties_of(settings: type, **common: Any) -> SimpleNamespace:
     SimpleNamespace
         The properties by the fields' names, to be used as annotations of a property group.
     """
-    made = SimpleNamespace()
+    properties = SimpleNamespace()
     for f in fields(settings):
         if f.metadata:
             given = {"name": f.name.replace("_", " ").title(), "default": f.default, **f.metadata, **common}
             given["options"] = f.metadata.get("options", given.get("options", {'ANIMATABLE'}))
-            setattr(made, f.name, _MAKERS[type(f.default)](**given))
-    return made
+            setattr(properties, f.name, _MAKERS[type(f.default)](**given))
+    return properties
 
 
 def settings_in(*settings: type, only: Iterable[str] = (), **common: Any) -> type:
@@ -66,14 +66,14 @@ def settings_in(*settings: type, only: Iterable[str] = (), **common: Any) -> typ
     What belongs together is one setting for artists: the least and the most of something with how soft both are, and a
     direction with its spread. Each number keeps its own name for files and scripts.
     """
-    made = {name: value for one in settings for name, value in vars(properties_of(one, **common)).items()}
-    made = {name: made[name] for name in only or made}
-    ends = {name.removesuffix("_min"): (name, f"{name[:-3]}max") for name in made if name.endswith("_min")}
-    ends |= {name.removesuffix("_spread"): (name[:-7], name) for name in made if name.endswith("_spread")}
+    properties = {name: value for one in settings for name, value in vars(properties_of(one, **common)).items()}
+    properties = {name: properties[name] for name in only or properties}
+    ends = {name.removesuffix("_min"): (name, f"{name[:-3]}max") for name in properties if name.endswith("_min")}
+    ends |= {name.removesuffix("_spread"): (name[:-7], name) for name in properties if name.endswith("_spread")}
     for stem, names in ends.items():
-        soft = tuple(name for name in (f"{stem}_falloff", f"{stem}_softness") if name in made)
-        made[f"{stem}_range"] = _range(names, soft, {name: made[name].keywords for name in (*names, *soft)})
-    return type(settings[0].__name__, (), {"__annotations__": made})
+        soft = tuple(name for name in (f"{stem}_falloff", f"{stem}_softness") if name in properties)
+        properties[f"{stem}_range"] = _range(names, soft, {name: properties[name].keywords for name in (*names, *soft)})
+    return type(settings[0].__name__, (), {"__annotations__": properties})
 
 
 #: Of several numbers, by those of one: Blender knows no others for them.
@@ -127,11 +127,11 @@ def rules_of(layer: bpy.types.PropertyGroup) -> bpy.types.PropertyGroup:
 
 def active_in(owner: bpy.types.PropertyGroup, entries: str) -> bpy.types.PropertyGroup | None:
     """The active entry of a list of an owner; None without one."""
-    found, index = getattr(owner, entries), getattr(owner, f"{entries}_index")
-    return found[index] if 0 <= index < len(found) else None
+    groups, index = getattr(owner, entries), getattr(owner, f"{entries}_index")
+    return groups[index] if 0 <= index < len(groups) else None
 
 
-def switches(name: str, description: str, made: dict[str, Any]) -> type:
+def switches(name: str, description: str, properties: dict[str, Any]) -> type:
     """A mix-in with Boolean properties, which are hidden, and one by which artists see them side by side.
 
     Parameters
@@ -139,10 +139,10 @@ def switches(name: str, description: str, made: dict[str, Any]) -> type:
     name : str
         Identifier of that; in title case its label.
     """
-    said = [one.keywords for one in made.values()]
+    said = [one.keywords for one in properties.values()]
 
     def store(group: bpy.types.PropertyGroup, bits: int) -> None:
-        for number, one in enumerate(made):
+        for number, one in enumerate(properties):
             if getattr(group, one) != bool(bits >> number & 1):
                 setattr(group, one, bool(bits >> number & 1))
 
@@ -153,13 +153,13 @@ def switches(name: str, description: str, made: dict[str, Any]) -> type:
         description=description,
         items=[
             (key.upper(), one["name"], one["description"], 1 << n)
-            for n, (key, one) in enumerate(zip(made, said, strict=True))
+            for n, (key, one) in enumerate(zip(properties, said, strict=True))
         ],
-        get=lambda self: sum(getattr(self, one) << number for number, one in enumerate(made)),
+        get=lambda self: sum(getattr(self, one) << number for number, one in enumerate(properties)),
         set=store,
         options={'ENUM_FLAG', 'SKIP_SAVE'},
     )
-    return type(name, (), {"__annotations__": {**made, name: together}})
+    return type(name, (), {"__annotations__": {**properties, name: together}})
 
 
 _ENDLESS = 1e30  # what Blender has for no bound is larger
@@ -377,8 +377,8 @@ def season_name(season: Season) -> str:
 
 def most_memory(scene: bpy.types.Scene) -> float:
     """Gigabytes that Blender may take: what a script set for a scene, else the preferences' limit; 0 is automatic."""
-    own = preferences()
-    return scene.tetflora.max_memory or (own.max_memory if own is not None else 0.0)
+    prefs = preferences()
+    return scene.tetflora.max_memory or (prefs.max_memory if prefs is not None else 0.0)
 
 
 def begin(scene: bpy.types.Scene) -> None:

@@ -40,13 +40,13 @@ def _read_language(path: Path) -> Entries:
 
 def read_languages(folder: Path = FOLDER) -> dict[str, Entries]:
     """Translations by language; a file that cannot be used is reported on stderr and left out."""
-    found = {}
+    languages = {}
     for path in sorted(folder.glob("*.json")):
         try:
-            found[path.stem] = _read_language(path)
+            languages[path.stem] = _read_language(path)
         except TetFloraError as error:
             print(f"TetFlora: error: {error}", file=sys.stderr, flush=True)
-    return found
+    return languages
 
 
 def register() -> None:

@@ -109,8 +109,8 @@ def written(
     blocks: Iterable[_Item], write: Callable[[_Item], Generator[None, None, Progress]], progress: Progress
 ) -> Job[None]:
     """Write blocks one by one, while a thread makes the next."""
-    with closing(in_thread((block for block in blocks), ahead=1)) as made:
-        for block in made:
+    with closing(in_thread((block for block in blocks), ahead=1)) as items:
+        for block in items:
             if block is not None:
                 progress = yield from progress.during(write(block))
             yield progress.repeated if block is None else progress

@@ -441,11 +441,11 @@ def window_bounds(local: Floats, camera: Camera) -> tuple[Floats, Floats, Floats
     for first, second in EDGES[(count > EDGES).all(axis=1)]:
         a, b = local[mixed, first], local[mixed, second]
         crosses = np.flatnonzero(counted[mixed, first] != counted[mixed, second])
-        at, a, b = mixed[crosses], a[crosses], b[crosses]
+        crossing, a, b = mixed[crosses], a[crosses], b[crosses]
         fraction = (near - a[:, 2:]) / (b[:, 2:] - a[:, 2:])
         cut = a + fraction * (b - a)
         point = cut[:, :2] if camera.kind == "ORTHO" else cut[:, :2] / near
-        low[at], high[at] = np.minimum(low[at], point), np.maximum(high[at], point)
-        total[at] += point
-        number[at] += 1.0
+        low[crossing], high[crossing] = np.minimum(low[crossing], point), np.maximum(high[crossing], point)
+        total[crossing] += point
+        number[crossing] += 1.0
     return low, high, total / np.maximum(number, 1.0)[:, None]

@@ -328,11 +328,11 @@ class ShapedTotals:
         exact = rows.copy()
         exact["taper"][:, 1] = 0
         for i in np.flatnonzero(shaped)[::-1]:  # stems before what they grow on
-            own, on_limbs = power[i], borne[i]
-            own[:, 0, _AREA] += totals.leaf_area[i, 1, i] * kinds[i]
-            own[:, 0, _LEAF_FACES] += totals.leaves[i, i] * polygons[i] * kinds[i]
-            own[:, 0, _FACES] += totals.fixed_faces[i, i]
-            own[:, 0, _WOOD] += totals.fixed_wood[i, i]
+            sums, on_limbs = power[i], borne[i]
+            sums[:, 0, _AREA] += totals.leaf_area[i, 1, i] * kinds[i]
+            sums[:, 0, _LEAF_FACES] += totals.leaves[i, i] * polygons[i] * kinds[i]
+            sums[:, 0, _FACES] += totals.fixed_faces[i, i]
+            sums[:, 0, _WOOD] += totals.fixed_wood[i, i]
             trunk = np.argmax(rows["species"] == rows["species"][i])
             below, above = crown_effects.trunk_ratios(_BASES, rows["part"][trunk, 1])
             stretch = above if rows["continues"][i] else below
@@ -344,36 +344,36 @@ class ShapedTotals:
                 if sort in (FORK, SPUR):
                     one = _children_sums(exact, i, int(sort))
                 if sort == FORK:
-                    for whole, its in ((own, power[j]), (on_limbs, borne[j])):
+                    for whole, its in ((sums, power[j]), (on_limbs, borne[j])):
                         stem = its * one.number
                         stem[:, :, _WOOD] = its[:, :, _WOOD] * one.wood * (above / stretch)[:, None]
                         whole += stem
                 elif sort == SPUR:
-                    own[:, 0, _LEAVES] += one.full * leaves
-                    own[:, 0, _FACES] += one.number * fixed_faces + one.full * full_faces
-                    own[:, 0, _SPURS] += one.wood * fixed_wood + one.full_wood * full_wood + one.full * spurs
+                    sums[:, 0, _LEAVES] += one.full * leaves
+                    sums[:, 0, _FACES] += one.number * fixed_faces + one.full * full_faces
+                    sums[:, 0, _SPURS] += one.wood * fixed_wood + one.full_wood * full_wood + one.full * spurs
                 else:
                     weight = rows["count_by_length"][j]
                     for b, base in enumerate(_BASES):
                         number, bearing, longer, wood, full, more = _limbs(exact, int(i), int(sort), base)
                         still, grows = (1 - weight) * bearing, weight * longer
-                        own[b, 0, _FACES] += number * fixed_faces
-                        own[b, 1, _WOOD] += wood * fixed_wood / stretch[b]
-                        bears = np.zeros_like(own[b])
+                        sums[b, 0, _FACES] += number * fixed_faces
+                        sums[b, 1, _WOOD] += wood * fixed_wood / stretch[b]
+                        bears = np.zeros_like(sums[b])
                         bears[0, _LEAVES], bears[1, _LEAVES] = still * leaves, grows * leaves
                         bears[:2, _FACES] = still * full_faces, grows * full_faces
                         bears[1:, _WOOD] = np.array([(1 - weight) * full, weight * more]) * full_wood / stretch[b]
                         bears[:2, _SPURS] = still * spurs, grows * spurs
-                        own[b] += bears
+                        sums[b] += bears
                         if sort == LATERAL:
                             on_limbs[b] += bears
         return cls(shaped, power, borne)
 
     def leaves(self, subplants: Branches, faces: bool = False, kinds: bool = False) -> Floats:
         """Area or number of faces (n,) of leaves of sub-plants over that of plants as described; (n, k) by kind."""
-        some = _LEAF_FACES if faces else _AREA
-        own, plain = (one[:, some] if kinds else one[:, some].sum(axis=1) for one in self._values(subplants))
-        return _over(own, plain)
+        columns = _LEAF_FACES if faces else _AREA
+        shaped, plain = (one[:, columns] if kinds else one[:, columns].sum(axis=1) for one in self._values(subplants))
+        return _over(shaped, plain)
 
     def faces(self, subplants: Branches) -> Floats:
         """Faces (n,) of branches, likewise."""
@@ -381,8 +381,8 @@ class ShapedTotals:
 
     def wood(self, subplants: Branches) -> tuple[Floats, Floats]:
         """Surface (n,) over length × radius, and that of short shoots (n,), likewise."""
-        own, plain = self._values(subplants)
-        return _over(own[:, _WOOD], plain[:, _WOOD]), _over(own[:, _SPURS], plain[:, _SPURS])
+        shaped, plain = self._values(subplants)
+        return _over(shaped[:, _WOOD], plain[:, _WOOD]), _over(shaped[:, _SPURS], plain[:, _SPURS])
 
     def _values(self, subplants: Branches) -> tuple[Floats, Floats]:
         """Totals (n, t) of sub-plants that are formed, and of the same as described."""
@@ -399,8 +399,8 @@ class ShapedTotals:
         return (factors * power).sum(axis=1), (np.ones((1, 3, 1)) * self.power[row, 0]).sum(axis=1)
 
 
-def _over(own: Floats, plain: Floats) -> Floats:
-    return np.where(plain > 0, own / np.where(plain > 0, plain, 1.0), 1.0)
+def _over(shaped: Floats, plain: Floats) -> Floats:
+    return np.where(plain > 0, shaped / np.where(plain > 0, plain, 1.0), 1.0)
 
 
 def _limbs(rows: Table, i: int, sort: int, base: float) -> tuple[float, ...]:
@@ -409,17 +409,17 @@ def _limbs(rows: Table, i: int, sort: int, base: float) -> tuple[float, ...]:
     Their number; the sums of what new ones lack of their numbers, of that × vigor; of length × radius over the
     parent's; and of that × the first and the second.
     """
-    at, row = np.array([i]), rows[i]
+    index, row = np.array([i]), rows[i]
     number = float(row["count"][sort, 0])
-    bare = float(crown_effects.bare_part(rows, at, base)[0])
-    among = crown_effects.lateral_fractions(rows, at, base)[0] if sort == LATERAL else row["fraction"][sort]
+    bare = float(crown_effects.bare_part(rows, index, base)[0])
+    among = crown_effects.lateral_fractions(rows, index, base)[0] if sort == LATERAL else row["fraction"][sort]
     weight, fading = 1.0, 1.0
     if row["growing"][sort, NOW] > 0:
         ends, plain = ((bare,), ()) if sort == LATERAL else ((0.0, bare), (0.0, 0.0))
         number *= living(row, sort, *ends) / max(living(row, sort, *plain), 1e-12)
         t, fraction, weight, fading = spread_children(row, sort, bare * (sort == LATERAL), bare * (sort == DEAD), among)
     elif sort == DEAD:
-        (start, end), last = row["start"][sort], float(crown_effects.dead_end(rows, at, base)[0])
+        (start, end), last = row["start"][sort], float(crown_effects.dead_end(rows, index, base)[0])
         number *= (last - start) / (end - start) if end > start else 1.0
         t, fraction = start + (last - start) * EVEN, among[0] + (among[1] - among[0]) * EVEN
     else:
@@ -429,7 +429,7 @@ def _limbs(rows: Table, i: int, sort: int, base: float) -> tuple[float, ...]:
         start = max(mean, bare)
         t, fraction = start + (1 - start) * EVEN, among[0] + (among[1] - among[0]) * EVEN
     if sort == LATERAL:
-        number *= float(crown_effects.limb_count_factors(rows, at, base)[0])
+        number *= float(crown_effects.limb_count_factors(rows, index, base)[0])
     vigor, _, size = _side_branches(rows, i, sort, t, fraction, fading)
     # Numbers of a branch on which nothing follows the length: all but those of new branches.
     plain = rows[[row["next"][sort]]].copy()
@@ -514,9 +514,9 @@ class DayTotals:
             added = added / every[:, None]
             if owner is not None and (kind == one).all():
                 return gathered(factor, owner)[:, None] * summer + gathered(added, owner)
-            some = np.flatnonzero(kind == one)
-            which = some if owner is None else owner[some]
-            out[some] = factor[which, None] * summer[some] + added[which]
+            leaves = np.flatnonzero(kind == one)
+            which = leaves if owner is None else owner[leaves]
+            out[leaves] = factor[which, None] * summer[leaves] + added[which]
         return out
 
     def widths(self, subplants: Branches, leaf: Floats, bare: Floats) -> Floats:
@@ -570,12 +570,12 @@ def totals_of_day(
     if all(one.year is None for one in species):
         return None
     rows = seasons.seasonal_rows(rows, species, season)
-    own = [one.year and one.year.at_latitude(abs(season.latitude)) for one in species]
-    kinds = [[None if year is None else year.of_kind(k) for k in range(KINDS)] for year in own]
-    every = list(dict.fromkeys(leaf for some in kinds for leaf in some))
+    local_years = [one.year and one.year.at_latitude(abs(season.latitude)) for one in species]
+    kinds = [[None if year is None else year.of_kind(k) for k in range(KINDS)] for year in local_years]
+    every = list(dict.fromkeys(leaf for leaves in kinds for leaf in leaves))
     tables = np.stack([seasons.leaf_table(one) for one in every])
     origin = np.array([0.0 if one is None else one.origin for one in every])
-    of_species = np.array([[every.index(one) for one in some] for some in kinds])
+    of_species = np.array([[every.index(one) for one in leaves] for leaves in kinds])
     years = np.zeros((len(species), KINDS), rows.dtype["year"])
     for number in range(len(species)):
         for kind in range(KINDS):
@@ -585,8 +585,8 @@ def totals_of_day(
     number = rows["species"]
     count = totals.leaves.sum(axis=1)
     twig = np.where(count > 0, totals.leaves @ totals.radius / np.maximum(count, 1e-300), totals.radius)
-    made = DayTotals(years[number], of_species[number], tables, origin, *_by_kind(rows, totals, leaf), 2.0 * twig)
-    return (rows, made) if _differs(rows, made, of_species) else None
+    day_totals = DayTotals(years[number], of_species[number], tables, origin, *_by_kind(rows, totals, leaf), 2.0 * twig)
+    return (rows, day_totals) if _differs(rows, day_totals, of_species) else None
 
 
 def _by_kind(rows: Table, totals: Averages, leaf: RowLeaves) -> tuple[Floats, ...]:
@@ -596,9 +596,9 @@ def _by_kind(rows: Table, totals: Averages, leaf: RowLeaves) -> tuple[Floats, ..
     color = np.zeros((*area.shape, 3))
     used = [kind for kind in range(KINDS) if area[..., kind].any()]
     for kind in used[:-1]:
-        some = rows.copy()
-        some["leaves"] *= kinds[:, kind, None]
-        color[:, :, kind] = average(some, leaf).leaf_color
+        kind_rows = rows.copy()
+        kind_rows["leaves"] *= kinds[:, kind, None]
+        color[:, :, kind] = average(kind_rows, leaf).leaf_color
     if used:  # the last has what is left
         color[:, :, used[-1]] = np.maximum(totals.leaf_color - color.sum(axis=2), 0.0)
     return area, color, totals.leaves @ kinds, (totals.leaves * leaf.polygons) @ kinds
@@ -609,14 +609,14 @@ def _days_of_plants(trunk: np.void) -> Floats:
     return seasons.plant_days(trunk["day"], max(trunk["spring"], trunk["autumn"]))
 
 
-def _differs(rows: Table, made: DayTotals, of_species: Integers) -> bool:
+def _differs(rows: Table, day_totals: DayTotals, of_species: Integers) -> bool:
     """Whether any plant may have other leaves than in summer."""
     summer = np.array([[1.0], [1.0], [1.0], [0.0], [0.0], [0.0]])
     trunk = np.unique(rows["species"], return_index=True)[1]
     for row, which in zip(rows[trunk], of_species, strict=True):
         days = _days_of_plants(row)
         for table in which.tolist():
-            left = seasons.expected(made.tables, made.origin, np.full(len(days), table), days)
+            left = seasons.expected(day_totals.tables, day_totals.origin, np.full(len(days), table), days)
             if np.abs(np.array(left) - summer).max() > 1e-9:
                 return True
     return False

@@ -223,9 +223,9 @@ def sampled_bounds(parts: Sequence[Points], rows: int) -> Floats:
         root = np.where((points.limbs.kind >= LIMB)[:, None], points.limbs.root, points.position)
         along, way = points.position[:, 2], points.position[:, 2] - root[:, 2]
         across, leaves = (np.hypot(place[:, 0], place[:, 1]) for place in (points.position, root))
-        found = np.stack([across, -along, along, leaves, -way, way], axis=1)
+        extents = np.stack([across, -along, along, leaves, -way, way], axis=1)
         for row, (first, number) in enumerate(zip(points.first, points.number, strict=True)):
-            some = slice(int(first.min()), int((first + number).max()))  # the runs of a row follow one another
-            out[row] = np.maximum(out[row], found[some].max(axis=0, initial=0.0))
+            span = slice(int(first.min()), int((first + number).max()))  # the runs of a row follow one another
+            out[row] = np.maximum(out[row], extents[span].max(axis=0, initial=0.0))
     out[:, [1, 4]] *= -1
     return out

@@ -68,25 +68,25 @@ def covered(corners: Floats, first: Integers, number: Integers) -> tuple[Integer
     if len(first) == 0:
         return np.zeros(0, np.intp), np.zeros((0, 2), np.int64)
     x, y = np.ascontiguousarray(corners.T)
-    there = np.arange(1, len(x) + 1)
-    there[first + number - 1] = first
+    following = np.arange(1, len(x) + 1)
+    following[first + number - 1] = first
     # Sides cross the lines of the lattice from the one above their lower end to the last below their upper end.
     ends = np.ceil(y)
-    low, high = np.minimum(ends, ends[there]), np.maximum(ends, ends[there])
+    low, high = np.minimum(ends, ends[following]), np.maximum(ends, ends[following])
     side, step = spread((high - low).astype(np.int64))
     row = low[side].astype(np.int64) + step
-    x0, y0, x1, y1 = x[side], y[side], x[there[side]], y[there[side]]
-    at = x0 + (x1 - x0) * (row - y0) / (y1 - y0)
+    x0, y0, x1, y1 = x[side], y[side], x[following[side]], y[following[side]]
+    crossing = x0 + (x1 - x0) * (row - y0) / (y1 - y0)
     polygon = np.repeat(np.arange(len(first)), number)[side]
-    if len(at) == 0:
+    if len(crossing) == 0:
         return np.zeros(0, np.intp), np.zeros((0, 2), np.int64)
     # On each line a polygon begins and ends in turn. One key is sorted many times faster than three.
     lines = polygon * float(np.ptp(row) + 1) + (row - row.min())
-    order = np.argsort(lines + (at - at.min()) * (0.5 / max(float(np.ptp(at)), 1e-300)))
-    begin, end = np.ceil(at[order]).astype(np.int64).reshape(-1, 2).T
+    order = np.argsort(lines + (crossing - crossing.min()) * (0.5 / max(float(np.ptp(crossing)), 1e-300)))
+    begin, end = np.ceil(crossing[order]).astype(np.int64).reshape(-1, 2).T
     part, step = spread(np.maximum(end - begin, 0))
-    some = order[::2][part]
-    return polygon[some], np.stack([begin[part] + step, row[some]], axis=1)
+    entry = order[::2][part]
+    return polygon[entry], np.stack([begin[part] + step, row[entry]], axis=1)
 
 
 def cell_numbers(points: Sequence[Floats], shape: Integers) -> Integers:
@@ -108,7 +108,7 @@ def _path_lengths(origin: Floats, direction: Floats, shape: Integers) -> tuple[I
     inside = np.flatnonzero(leave > enter)
     enter, leave, origin = enter[inside], leave[inside], origin[inside]
     every = np.arange(len(inside))
-    ray, at = [every, every], [enter, leave]
+    ray, along = [every, every], [enter, leave]
     for plane in _PLANES:
         start, slope = origin @ plane, float(steep @ plane)
         if abs(slope) < 1e-9:
@@ -117,12 +117,12 @@ def _path_lengths(origin: Floats, direction: Floats, shape: Integers) -> tuple[I
         low = np.ceil(reach[0])
         owner, step = spread(np.maximum(np.floor(reach[1]) - low + 1, 0).astype(np.int64))
         ray.append(owner)
-        at.append((low[owner] + step - start[owner]) / slope)
-    ray, at = np.concatenate(ray), np.concatenate(at)
-    order = np.lexsort([at, ray])
-    ray, at = ray[order], at[order]
-    part = np.flatnonzero((ray[1:] == ray[:-1]) & (at[1:] > at[:-1]))
-    ray, length, middle = ray[part], at[part + 1] - at[part], (at[part] + at[part + 1]) / 2
+        along.append((low[owner] + step - start[owner]) / slope)
+    ray, along = np.concatenate(ray), np.concatenate(along)
+    order = np.lexsort([along, ray])
+    ray, along = ray[order], along[order]
+    part = np.flatnonzero((ray[1:] == ray[:-1]) & (along[1:] > along[:-1]))
+    ray, length, middle = ray[part], along[part + 1] - along[part], (along[part] + along[part + 1]) / 2
     points = [np.take(origin[:, k], ray) + steep[k] * middle for k in range(3)]
     return inside[ray], cell_numbers(points, shape), length
 
@@ -169,7 +169,7 @@ class LeafOutlines:
         """Corners (c, 2) of the faces of some, seen along the third of three axes, first corners and numbers (f,)."""
         model, base, frame, size = self.model, self.base[near], self.frame[near], self.size[near]
         local = (_inwards(frame, axis).T @ model.positions.T for axis in (u, v))
-        flat = ((base @ axis)[:, None] + size[:, None] * own for axis, own in zip((u, v), local, strict=True))
+        flat = ((base @ axis)[:, None] + size[:, None] * along for axis, along in zip((u, v), local, strict=True))
         corners = np.stack([one[:, model.corner_verts].ravel() for one in flat], axis=1)
         first = np.arange(len(near))[:, None] * len(model.corner_verts) + model.face_offsets[:-1]
         return corners, first.ravel(), np.tile(np.diff(model.face_offsets), len(near))
@@ -227,12 +227,12 @@ class PlantElements:
 
     def covered(self, near: Mask, u: Floats, v: Floats, spacing: float, low: Floats | float = 0.0) -> Integers:
         """Points (m, 2) of a lattice on the plane of two axes that outlines of some things, a mask (n,), cover."""
-        found, begin = [], 0
+        points, begin = [], 0
         for part in self.parts:
             corners, first, number = part.outlines(np.flatnonzero(near[begin : begin + len(part)]), u, v)
-            found.append(covered(corners / spacing - low, first, number)[1])
+            points.append(covered(corners / spacing - low, first, number)[1])
             begin += len(part)
-        return np.concatenate(found)
+        return np.concatenate(points)
 
 
 def elements_of(
@@ -270,28 +270,28 @@ def elements_of(
 
 def _wood(rows: Table, bodies: Branches, lines: Axes) -> tuple[WoodOutlines, Integers]:
     owner, index = spread(lines.segments)
-    some, number = bodies.take(owner), lines.segments[owner]
+    branches, number = bodies.take(owner), lines.segments[owner]
     ends = np.stack([lines.knot(owner, index + k) for k in (0, 1)], axis=1)
-    radii = np.stack([radius_at(rows, some, (index + k) / number) for k in (0, 1)], axis=1)
-    return WoodOutlines(ends, radii * (tube_perimeter(rows["sides"][some.row]) / (2 * np.pi))[:, None]), owner
+    radii = np.stack([radius_at(rows, branches, (index + k) / number) for k in (0, 1)], axis=1)
+    return WoodOutlines(ends, radii * (tube_perimeter(rows["sides"][branches.row]) / (2 * np.pi))[:, None]), owner
 
 
 def _leaves(rows: Table, forms: Forms, bodies: Branches, lines: Axes) -> Iterator[tuple[LeafOutlines, Integers]]:
     counts = leaf_counts(rows, bodies)
     for row in np.unique(bodies.row[counts > 0]):
-        some = np.flatnonzero((bodies.row == row) & (counts > 0))
-        branches, own = bodies.take(some), lines.take(some)
-        owner, index = spread(counts[some])
+        bearers = np.flatnonzero((bodies.row == row) & (counts > 0))
+        branches, branch_lines = bodies.take(bearers), lines.take(bearers)
+        owner, index = spread(counts[bearers])
         key = leaf_keys(branches, owner, index)
-        t = leaf_places(rows, branches, owner, index, counts[some], key)
-        leaves = place_leaves(rows, branches, own, owner, index, key, t)
+        t = leaf_places(rows, branches, owner, index, counts[bearers], key)
+        leaves = place_leaves(rows, branches, branch_lines, owner, index, key, t)
         frame = settled(rows, branches.row[:1], leaves.frame, leaves.light, leaves.sky)
         models = forms[int(rows["leaf_kind"][row])]
         form = leaf_forms(len(models), key)
         for k, model in enumerate(models):
             of = np.flatnonzero(form == k)
             if len(of):
-                yield LeafOutlines(model, leaves.position[of], frame[of], leaves.size[of]), some[owner[of]]
+                yield LeafOutlines(model, leaves.position[of], frame[of], leaves.size[of]), bearers[owner[of]]
 
 
 _METHOD = 1  # raise it when factors are found in another way
@@ -354,16 +354,16 @@ def fit_clumping(
     polygons, width, length : (r,) float64
         Expected faces of a sub-plant, width of its leaves (or 0) and length of its branch, meters at plant scale 1.
     """
-    root, density, own = np.zeros((3, len(rows)))
+    root, density, bias = np.zeros((3, len(rows)))
     usual = np.where(length > 0, length, 1.0)
     trunk = np.flatnonzero(np.diff(rows["species"], prepend=-1))
     for first, end in zip(trunk, [*trunk[1:], len(rows)], strict=True):
         every, leaves = slice(int(first), int(end)), forms[rows["species"][first]]
         fit = partial(_fitted, rows, leaves, every, polygons, width[first], usual)
         name = fingerprint(rows[every], leaves, _METHOD)
-        root[every], density[every], own[every] = cached("clumping", name, (3, int(end - first)), fit)
+        root[every], density[every], bias[every] = cached("clumping", name, (3, int(end - first)), fit)
     total = area.sum(axis=1)
-    return Clumping(np.where(total > 0, area @ own / np.where(total > 0, total, 1), own), own, root, density, usual)
+    return Clumping(np.where(total > 0, area @ bias / np.where(total > 0, total, 1), bias), bias, root, density, usual)
 
 
 def _fitted(rows: Table, forms: Forms, every: slice, polygons: Floats, width: float, usual: Floats) -> Floats:
@@ -374,9 +374,9 @@ def _fitted(rows: Table, forms: Forms, every: slice, polygons: Floats, width: fl
     finest = _FINEST * max(width, 0.0)
     parts = [seen for n, one in enumerate(things) for seen in _rays(one, len(orders), finest, n, len(things))]
     unit = np.sqrt(finest / _FINEST) if finest > 0 else np.sqrt(usual[every.start] / 100)
-    found = _solved(*(np.concatenate(values) for values in zip(*parts, strict=True)), unit)
-    own = np.clip(found[2] + found[3:][group], *_OFFSETS)
-    return np.stack([np.full(len(own), found[0] * unit), np.full(len(own), found[1]), own])
+    coefficients = _solved(*(np.concatenate(values) for values in zip(*parts, strict=True)), unit)
+    bias = np.clip(coefficients[2] + coefficients[3:][group], *_OFFSETS)
+    return np.stack([np.full(len(bias), coefficients[0] * unit), np.full(len(bias), coefficients[1]), bias])
 
 
 def _plants(rows: Table, first: int, polygons: Floats) -> list[Branches]:
@@ -430,17 +430,17 @@ def _rays(
             count = len(cells)
             density = np.bincount(within * groups + things.group, shown, count * groups).reshape(-1, groups) / h**3
             dense = np.bincount(within, shown * things.dense, count) / h**3
-            some = np.sort(pick[: max(int(segments / (3.5 * extent / side + 1)), 100)])
-            ray, cell, length = _path_lengths((origin[some] - corner) / side, direction, shape)
-            at = np.minimum(np.searchsorted(cells, cell), count - 1)
-            full = np.flatnonzero(cells[at] == cell)
-            ray, at = ray[full], at[full]
-            held = np.concatenate([dense[at, None], density[at]], axis=1) * (length[full] * side)[:, None]
-            depth = np.stack([np.bincount(ray, held[:, k], len(some)) for k in range(groups + 1)], axis=1)
+            rays = np.sort(pick[: max(int(segments / (3.5 * extent / side + 1)), 100)])
+            ray, cell, length = _path_lengths((origin[rays] - corner) / side, direction, shape)
+            index = np.minimum(np.searchsorted(cells, cell), count - 1)
+            full = np.flatnonzero(cells[index] == cell)
+            ray, index = ray[full], index[full]
+            held = np.concatenate([dense[index, None], density[index]], axis=1) * (length[full] * side)[:, None]
+            depth = np.stack([np.bincount(ray, held[:, k], len(rays)) for k in range(groups + 1)], axis=1)
             total = depth[:, 1:].sum(axis=1)
-            use = np.flatnonzero(met[some] | (total > 0))
+            use = np.flatnonzero(met[rays] | (total > 0))
             depth = np.stack((total / np.sqrt(h), depth[:, 0], total, *depth[:, 1:].T), axis=1)[use]
-            yield met[some][use], depth, np.full(len(use), 1 / max(len(use), 1))
+            yield met[rays][use], depth, np.full(len(use), 1 / max(len(use), 1))
 
 
 def _seen_along(things: PlantElements, direction: Floats, offset: float) -> tuple[Floats, Mask]:
@@ -459,8 +459,8 @@ def _seen_along(things: PlantElements, direction: Floats, offset: float) -> tupl
     inside = ((ray >= 0) & (ray < shape)).all(axis=1)
     met[ray[inside, 0] * shape[1] + ray[inside, 1]] = True
     i = np.arange(len(met))
-    at = (np.stack([i // shape[1], i % shape[1]], axis=1) + low) * spacing
-    return at[:, :1] * u + at[:, 1:] * v, met
+    grid = (np.stack([i // shape[1], i % shape[1]], axis=1) + low) * spacing
+    return grid[:, :1] * u + grid[:, 1:] * v, met
 
 
 def _solved(met: Mask, depth: Floats, weight: Floats, unit: float) -> Floats:
@@ -472,18 +472,18 @@ def _solved(met: Mask, depth: Floats, weight: Floats, unit: float) -> Floats:
     depth = depth * np.where(np.arange(depth.shape[1]) == 0, unit, 1.0)
     weight = depth * (weight / weight.sum() / np.maximum(depth[:, 2], 1e-12))[:, None]
     kind = np.minimum(np.arange(depth.shape[1]), len(_PRIOR) - 1)
-    prior, found = _PRIOR[kind], _PRIOR[kind]
+    prior, coefficients = _PRIOR[kind], _PRIOR[kind]
     for _ in range(_STEPS):
-        through = np.exp(-np.maximum(depth @ found, 0))
+        through = np.exp(-np.maximum(depth @ coefficients, 0))
         error = weight.T @ (1 - through - met)
         slope = (weight * through[:, None]).T @ depth
         ridge = _RIDGE[kind] * slope[2, 2]
-        step = np.linalg.solve(slope + np.diag(ridge), -error - ridge * (found - prior))
+        step = np.linalg.solve(slope + np.diag(ridge), -error - ridge * (coefficients - prior))
         largest = float(np.abs(step).max())
-        found = found + step / max(1.0, largest)
+        coefficients = coefficients + step / max(1.0, largest)
         if largest < 1e-4:
             break
-    return found
+    return coefficients
 
 
 #: Fields that depend on what other species there are, one that others give, and one that changes no area.

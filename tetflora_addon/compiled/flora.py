@@ -121,10 +121,10 @@ class Flora:
         """Points on the leaves and wood of sub-plants."""
         return self.samples_of(range(len(self.rows)))
 
-    def samples_of(self, some: Container[int], times: int = 1) -> Samples:
+    def samples_of(self, sampled: Container[int], times: int = 1) -> Samples:
         """Samples of some rows alone, and so many times as many, of plants in summer."""
         totals = self.averages
-        return draw_samples(self.rows, totals.leaf_area[:, 1], _wood_totals(totals), totals.length, some, times)
+        return draw_samples(self.rows, totals.leaf_area[:, 1], _wood_totals(totals), totals.length, sampled, times)
 
     @_in_summer
     def of_several_kinds(self) -> Integers:
@@ -136,10 +136,10 @@ class Flora:
     @_in_summer
     def samples_by_kind(self) -> dict[int, Samples]:
         """Of these species, `samples` with leaves of one kind alone, by kind."""
-        totals, some = self.averages, np.flatnonzero(np.isin(self.rows["species"], self.of_several_kinds))
-        own = ((kind, totals.leaf_area[:, 1] * (self.rows["leaf_kind"] == kind)) for kind in range(len(LEAF_KINDS)))
-        given = _wood_totals(totals), totals.length, some, 1
-        return {kind: draw_samples(self.rows, area, *given) for kind, area in own if area[some].any()}
+        totals, sampled = self.averages, np.flatnonzero(np.isin(self.rows["species"], self.of_several_kinds))
+        areas = ((kind, totals.leaf_area[:, 1] * (self.rows["leaf_kind"] == kind)) for kind in range(len(LEAF_KINDS)))
+        given = _wood_totals(totals), totals.length, sampled, 1
+        return {kind: draw_samples(self.rows, area, *given) for kind, area in areas if area[sampled].any()}
 
     @_in_summer
     def sampled_bound(self) -> Floats:
@@ -198,11 +198,11 @@ class Flora:
         """Expected surface (n,) of the branches of sub-plants, m²."""
         row, full = subplants.row, fullness(self.rows, subplants, wood=True)
         relative, spurs = self.fixed_wood[row] + full * self.full_wood[row], full * self.spur_wood[row]
-        some = self._shaped(subplants)
-        if len(some):
-            wood, short = self.shaped_totals.wood(subplants.take(some))
-            relative[some] *= wood
-            spurs[some] *= short
+        shaped = self._shaped(subplants)
+        if len(shaped):
+            wood, short = self.shaped_totals.wood(subplants.take(shaped))
+            relative[shaped] *= wood
+            spurs[shaped] *= short
         return relative * subplants.length * subplants.radius + spurs * subplants.scale**2
 
     def face_counts(self, subplants: Branches) -> Floats:
@@ -217,9 +217,9 @@ class Flora:
         """Expected number (n,) of the faces of the branches of sub-plants."""
         fixed, wood = self.fixed_faces[subplants.row], (self.polygons - self.leaf_faces)[subplants.row]
         counts = fixed + fullness(self.rows, subplants, wood=True) * (wood - fixed)
-        some = self._shaped(subplants)
-        if len(some):
-            counts[some] += (self.shaped_totals.faces(subplants.take(some)) - 1.0) * wood[some]
+        shaped = self._shaped(subplants)
+        if len(shaped):
+            counts[shaped] += (self.shaped_totals.faces(subplants.take(shaped)) - 1.0) * wood[shaped]
         return counts
 
     @_in_summer
@@ -235,11 +235,11 @@ class Flora:
 
     def _shaped_leaves(self, subplants: Branches, faces: bool = False, kinds: bool = False) -> Floats | float:
         """`ShapedTotals.leaves` (n,) or (n, k) of sub-plants, 1 where nothing is formed."""
-        some = self._shaped(subplants)
-        if not len(some):
+        shaped = self._shaped(subplants)
+        if not len(shaped):
             return 1.0
         out = np.ones((len(subplants), len(LEAF_KINDS)) if kinds else len(subplants))
-        out[some] = self.shaped_totals.leaves(subplants.take(some), faces, kinds)
+        out[shaped] = self.shaped_totals.leaves(subplants.take(shaped), faces, kinds)
         return out
 
     def one_leaf_area(self, branches: Branches, kind: int | None = None) -> Floats:
@@ -314,8 +314,8 @@ def _compiled(species: tuple[Species, ...]) -> Flora:
 @lru_cache(maxsize=8)
 def _on_day(flora: Flora, season: Season) -> Flora:
     """A flora in summer on a day of the year."""
-    found = totals_of_day(flora.rows, flora.species, season, flora.averages, flora.leaf)
-    return flora if found is None else replace(flora, rows=found[0], summer=flora, day=found[1])
+    changes = totals_of_day(flora.rows, flora.species, season, flora.averages, flora.leaf)
+    return flora if changes is None else replace(flora, rows=changes[0], summer=flora, day=changes[1])
 
 
 @lru_cache(maxsize=8)
@@ -332,15 +332,15 @@ def _with_drawn(rows: Table, bound: Floats) -> Floats:
     """Bounds in which plants drawn by hand have theirs: the drawing, and what grows on it in any direction."""
     bound = bound.copy()
     for i in np.flatnonzero(rows["phantom"]):
-        own = rows[slice(*rows["drawn_rows"][i])]
-        child = own["next"][:, LATERAL]
+        drawn = rows[slice(*rows["drawn_rows"][i])]
+        child = drawn["next"][:, LATERAL]
         farthest = np.hypot(bound[child, 0], np.maximum(bound[child, 2], -bound[child, 1]))
-        reach = np.where(child >= 0, own["size"][:, 0] * rows["length"][child].sum(axis=1) * farthest, 0.0)
-        reach = np.maximum(reach, own["size"][:, 0] * envelope_reach(own))
-        across, height = np.hypot(own["knots"][..., 0], own["knots"][..., 1]), own["knots"][..., 2]
+        reach = np.where(child >= 0, drawn["size"][:, 0] * rows["length"][child].sum(axis=1) * farthest, 0.0)
+        reach = np.maximum(reach, drawn["size"][:, 0] * envelope_reach(drawn))
+        across, height = np.hypot(drawn["knots"][..., 0], drawn["knots"][..., 1]), drawn["knots"][..., 2]
         if is_windy(rows):  # no point moves farther than an arc that turns as its height does
             above = np.maximum(height.max(), 0.0)
-            reach = reach + widest_sway(own[0]) * above * (above / 2 + across.max())
+            reach = reach + widest_sway(drawn[0]) * above * (above / 2 + across.max())
         low, high = (height - reach[:, None]).min(), (height + reach[:, None]).max()
         bound[i] = np.array([(across + reach[:, None]).max(), min(low, 0.0), max(high, 0.0)]) / rows["length"][i, 0]
     return bound
@@ -383,27 +383,27 @@ def placed_samples(
         Area over that of other samples of the same sub-plant, 1 on the mean; None where all stand for as much.
     """
     place, rows = gathered(points.position, pick), flora.rows
-    some = shaped_subplants(rows, subplants)
-    if not len(some):
+    shaped = shaped_subplants(rows, subplants)
+    if not len(shaped):
         return place, None
     place, share = place.astype(np.float64), np.ones(len(owner))
     number = np.full(len(subplants), -1)
-    number[some] = np.arange(len(some))
+    number[shaped] = np.arange(len(shaped))
     mine = np.flatnonzero(number[owner] >= 0)
-    own, which = subplants.take(some), number[owner[mine]]
-    light = own.crown[which][:, LIGHT].astype(np.float64)[:, :2]
+    tree, which = subplants.take(shaped), number[owner[mine]]
+    light = tree.crown[which][:, LIGHT].astype(np.float64)[:, :2]
     if turn is not None:
         c, s = np.cos(turn[mine]), np.sin(turn[mine])
         light = np.stack([c * light[:, 0] + s * light[:, 1], c * light[:, 1] - s * light[:, 0]], axis=1)
-    at, reach, sparse = _moved(rows, own, points.limbs.take(pick[mine]), place[mine], which, light)
-    place[mine] = at / length_factors(rows, own.row, own.crown)[which, None]
+    moved, reach, sparse = _moved(rows, tree, points.limbs.take(pick[mine]), place[mine], which, light)
+    place[mine] = moved / length_factors(rows, tree.row, tree.crown)[which, None]
     leafy = points is not flora.samples.wood
-    share[mine] = _shares(flora, own, points.shares, points.limbs.take(pick[mine]), which, reach, sparse, leafy)
+    share[mine] = _shares(flora, tree, points.shares, points.limbs.take(pick[mine]), which, reach, sparse, leafy)
     return place, share
 
 
 def _moved(
-    rows: Table, own: Branches, on: Limbs, place: Floats, which: Integers, light: Floats
+    rows: Table, tree: Branches, on: Limbs, place: Floats, which: Integers, light: Floats
 ) -> tuple[Floats, Floats, Floats]:
     """Places (m, 3) of samples on limbs, ``which`` (m,) of sub-plants (n,), in lengths of those as described.
 
@@ -411,8 +411,8 @@ def _moved(
 
     Also how far the limbs reach over what they do as described (m,), and how many of them are left (n, 4) by class.
     """
-    row, root = own.row, np.where((on.kind >= LIMB)[:, None], on.root, place)
-    crown = own.crown.astype(np.float64)
+    row, root = tree.row, np.where((on.kind >= LIMB)[:, None], on.root, place)
+    crown = tree.crown.astype(np.float64)
     start = rows["start"][row, LATERAL, 0]
     bare = np.maximum(start, bare_part(rows, row, crown[:, BASE]))
     left = (1 - bare) / np.maximum(1 - start, 1e-9)
@@ -437,7 +437,7 @@ def _moved(
     moved = np.where(stem[:, None], stems, moved)
     way = place - root
     longer = np.where(limb & ~stool, reach(way), 1.0)
-    along_limb = longer * np.where(limb, _other_lengths(rows, own, which, root, described[:, 2], stem), 1.0)
+    along_limb = longer * np.where(limb, _other_lengths(rows, tree, which, root, described[:, 2], stem), 1.0)
     leaning = np.sqrt(np.minimum(reach(way), MOST_LEANING))  # half of what is aside is on stems that lean
     moved += np.where(stool[:, None], _tilted(way, leaning), along_limb[:, None] * way)
     # Trunks and stems are longer or shorter themselves, limbs are fewer.
@@ -445,25 +445,25 @@ def _moved(
 
 
 def _other_lengths(
-    rows: Table, own: Branches, which: Integers, root: Floats, height: Floats, stem: Mask
+    rows: Table, tree: Branches, which: Integers, root: Floats, height: Floats, stem: Mask
 ) -> Floats | float:
     """Factors (m,) on the lengths of limbs of trunks that fork, because these are higher or lower in the crown.
 
     ``height`` (m,) is where limbs at ``root`` (m, 3) are on the trunk, if they are not on a ``stem`` (m,).
     """
-    if not ((rows["next"][own.row, FORK] >= 0) | rows["continues"][own.row]).any():
+    if not ((rows["next"][tree.row, FORK] >= 0) | rows["continues"][tree.row]).any():
         return 1.0
-    first = np.flatnonzero(np.diff(rows["species"], prepend=-1))[rows["species"][own.row]]
-    start = rows["start"][first, LATERAL, 0] * first_forks(rows, own.row)
-    base = np.maximum(start, np.minimum(own.crown[:, BASE], first_forks(rows, own.row)))
-    low, high = rows["part"][own.row].T[:, which]
+    first = np.flatnonzero(np.diff(rows["species"], prepend=-1))[rows["species"][tree.row]]
+    start = rows["start"][first, LATERAL, 0] * first_forks(rows, tree.row)
+    base = np.maximum(start, np.minimum(tree.crown[:, BASE], first_forks(rows, tree.row)))
+    low, high = rows["part"][tree.row].T[:, which]
     above = np.linalg.norm(root - [0.0, 0.0, 1.0], axis=1) * (high - low) / np.maximum(1 - high, 1e-9)
     above = high + (1 - high) * np.minimum(above, 1.0)
     ratio = []
     for place, begin in ((height, base[which]), (root[:, 2], start[which])):
         place = np.where(stem, above, low + (high - low) * np.clip(place, 0.0, 1.0))
         fraction = np.clip((place - begin) / np.maximum(1 - begin, 1e-9), 0.0, 1.0)
-        ratio.append(np.maximum(lengths(rows, own.row[which], fraction), 0.1))
+        ratio.append(np.maximum(lengths(rows, tree.row[which], fraction), 0.1))
     return np.clip(ratio[0] / ratio[1], 0.5, 2.0)
 
 
@@ -476,28 +476,28 @@ def _tilted(way: Floats, factor: Floats) -> Floats:
 
 
 def _shares(
-    flora: Flora, own: Branches, shares: Shares, on: Limbs, which: Integers, reach: Floats, sparse: Floats, leafy: bool
+    flora: Flora, tree: Branches, shares: Shares, on: Limbs, which: Integers, reach: Floats, sparse: Floats, leafy: bool
 ) -> Floats:
     """What samples (m,) stand for, 1 on the mean; see `_moved`."""
-    totals, crown = flora.shaped_totals, own.crown.astype(np.float64)
-    ratio = np.where(totals.shaped[own.row], totals.leaves(own) if leafy else totals.wood(own)[0], 1.0)
-    follows, width = shares.follows[own.row], crown[:, WIDTH]
+    totals, crown = flora.shaped_totals, tree.crown.astype(np.float64)
+    ratio = np.where(totals.shaped[tree.row], totals.leaves(tree) if leafy else totals.wood(tree)[0], 1.0)
+    follows, width = shares.follows[tree.row], crown[:, WIDTH]
     bears = 1 - follows + follows * width
     if leafy:
         sparse = sparse.copy()
         sparse[:, :LIMB] = 1.0
     else:
-        ratio = ratio * length_factors(flora.rows, own.row, own.crown)
+        ratio = ratio * length_factors(flora.rows, tree.row, tree.crown)
         square = 1 + (crown[:, LIGHT][:, :2] ** 2).sum(axis=1) / 2
         bears = width * (1 - follows) + width**2 * square * follows
-    each = shares.kinds[own.row] * sparse
+    each = shares.kinds[tree.row] * sparse
     trunk, limbs = each[:, :LIMB].sum(axis=1), each[:, LIMB:].sum(axis=1) * bears
     # How many limbs there are is known exactly, by the sum that is expected.
     more = np.maximum(ratio - trunk, 0.0) / np.maximum(limbs, 1e-9)
     many = np.where(np.arange(4) < LIMB, 1.0, more[:, None]) * sparse / np.maximum(ratio, 1e-9)[:, None]
     bearing = 1 - on.follows + on.follows * reach
     bearing = np.where(on.kind < LIMB, 1.0, bearing if leafy else bearing * reach)
-    return np.where(are_stools(flora.rows, own.row)[which], 1.0, many[which, on.kind] * bearing)
+    return np.where(are_stools(flora.rows, tree.row)[which], 1.0, many[which, on.kind] * bearing)
 
 
 def extents(flora: Flora, subplants: Branches, farthest: bool = True) -> Floats:
@@ -506,23 +506,23 @@ def extents(flora: Flora, subplants: Branches, farthest: bool = True) -> Floats:
     Without ``farthest``, the radius of crowns that lean is about the mean of all sides.
     """
     bound = flora.sampled_bound[subplants.row]
-    some = shaped_subplants(flora.rows, subplants)
-    if len(some):
-        own, rows = subplants.take(some), flora.rows
-        crown, stool = own.crown.astype(np.float64), are_stools(rows, own.row)
-        stretch = length_factors(rows, own.row, own.crown)
+    shaped = shaped_subplants(flora.rows, subplants)
+    if len(shaped):
+        tree, rows = subplants.take(shaped), flora.rows
+        crown, stool = tree.crown.astype(np.float64), are_stools(rows, tree.row)
+        stretch = length_factors(rows, tree.row, tree.crown)
         lean = np.hypot(*crown[:, LIGHT].T[:2]) if farthest else 0.0
         reach = crown[:, WIDTH] * (1 + lean)
         reach = np.where(stool, np.sqrt(np.minimum(reach, MOST_LEANING)), reach)
-        radius, low, high, root, down, up = bound[some].T
-        start = rows["start"][own.row, LATERAL, 0]
-        left = (1 - np.maximum(start, bare_part(rows, own.row, crown[:, BASE]))) / np.maximum(1 - start, 1e-9)
+        radius, low, high, root, down, up = bound[shaped].T
+        start = rows["start"][tree.row, LATERAL, 0]
+        left = (1 - np.maximum(start, bare_part(rows, tree.row, crown[:, BASE]))) / np.maximum(1 - start, 1e-9)
         longer = np.where(stool, 0.0, np.maximum(reach - 1, 0.0))
         top = high + longer * up
         top += (1 - left) * np.maximum(1 + reach * up - top, 0.0) + np.maximum(stretch - 1, 0.0)
         top = np.where(stool & (reach < 1), np.hypot(radius, high), top)
         radius = reach * radius + np.where(farthest, np.abs(reach - 1) * root, 0.0)
-        bound[some, :3] = np.stack([radius, low + longer * down, top], axis=1) / stretch[:, None]
+        bound[shaped, :3] = np.stack([radius, low + longer * down, top], axis=1) / stretch[:, None]
     return bound[:, :3]
 
 
@@ -553,17 +553,17 @@ def bounds(flora: Flora, subplants: Branches) -> tuple[Floats, Floats]:
     """Bounds of sub-plants (n, 3) as `Flora.bound`, and how far (n,) these may reach beyond that; meters."""
     bound = flora.bound[subplants.row] * subplants.length[:, None]
     out = subplants.radius * flora.widest[subplants.row] + flora.leaf_reach[subplants.row] * subplants.scale
-    some = shaped_subplants(flora.rows, subplants)
-    if len(some):
-        own, rows = subplants.take(some), flora.rows
-        crown = own.crown.astype(np.float64)
+    shaped = shaped_subplants(flora.rows, subplants)
+    if len(shaped):
+        tree, rows = subplants.take(shaped), flora.rows
+        crown = tree.crown.astype(np.float64)
         raised = crown[:, BASE] > 0
-        bound[some[raised]] = flora.raised_bound[own.row[raised]] * own.length[raised, None]
-        stretch = length_factors(rows, own.row, own.crown)
+        bound[shaped[raised]] = flora.raised_bound[tree.row[raised]] * tree.length[raised, None]
+        stretch = length_factors(rows, tree.row, tree.crown)
         longer = crown[:, WIDTH] * (1 + np.linalg.norm(crown[:, LIGHT], axis=1))
-        longer = np.where(are_stools(rows, own.row), np.minimum(longer, MOST_LEANING), longer)
+        longer = np.where(are_stools(rows, tree.row), np.minimum(longer, MOST_LEANING), longer)
         # Nothing on a limb moves farther than that is longer, and forks move as far as the trunk is to them.
-        reach = flora.limb_reach[own.row] * np.maximum(longer - 1, 0.0)
-        out[some] += (reach + 3 * np.abs(stretch - 1)) * own.length / stretch
-        bound[some] /= stretch[:, None]
+        reach = flora.limb_reach[tree.row] * np.maximum(longer - 1, 0.0)
+        out[shaped] += (reach + 3 * np.abs(stretch - 1)) * tree.length / stretch
+        bound[shaped] /= stretch[:, None]
     return bound, out

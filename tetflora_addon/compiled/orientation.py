@@ -163,8 +163,8 @@ def orientation_of(rows: Table, forms: Sequence[Forms], leaf: Floats, wood: Floa
             weight = stands * fullness(rows, children) * leaf_area[row] * scale**2
             leaves = _Sums.of(len(branches), owner, _evaluated(out.leaves, row, children.frame, outward), weight)
             if leaf[i, i] > 0:
-                own = _own_leaves(rows, branches, lines, turn[i], place if beyond else None)
-                leaves = own.mixed(leaves, leaf[i, i] / leaf_area[i])
+                branch_leaves = _own_leaves(rows, branches, lines, turn[i], place if beyond else None)
+                leaves = branch_leaves.mixed(leaves, leaf[i, i] / leaf_area[i])
                 knots = np.stack([branches.position, branches.position + branches.frame[:, :, 2]], axis=1)
                 straight = Axes(knots, branches.frame[:, None], np.ones(len(branches), np.int64))
                 straight_leaves = _own_leaves(rows, branches, straight, turn[i], place)
@@ -229,8 +229,8 @@ def _skies_met(rows: Table, length: Floats) -> list[Floats]:
     out = []
     for i in range(len(rows)):
         if met[i]:
-            some = np.concatenate(met[i])
-            sky = some[thinned(len(some), _MET)]
+            directions = np.concatenate(met[i])
+            sky = directions[thinned(len(directions), _MET)]
         else:  # a trunk
             tilt = ranged(rows, "angle", np.full(_MET, i), key_of_seed(np.arange(_MET)), Draw.ANGLE)
             sky = np.stack([-np.sin(tilt), np.zeros(_MET), np.cos(tilt)], axis=1)
@@ -264,11 +264,11 @@ def _some_children(rows: Table, branches: Branches, lines: Axes) -> tuple[Branch
         counts = branch_counts(rows, branches, sort)
         if not counts.any():  # so rare that no branch has any
             counts = np.ones_like(counts)
-        some = np.flatnonzero(counts)
-        index = (uniform(branches.key[some], _CHILD + sort) * counts[some]).astype(np.int64)
-        grown.append(chosen_children(rows, branches, lines, some, index, counts, sort))
-        owners.append(some)
-        stands.append(counts[some].astype(np.float64))
+        parents = np.flatnonzero(counts)
+        index = (uniform(branches.key[parents], _CHILD + sort) * counts[parents]).astype(np.int64)
+        grown.append(chosen_children(rows, branches, lines, parents, index, counts, sort))
+        owners.append(parents)
+        stands.append(counts[parents].astype(np.float64))
     return Branches.concatenate(grown), np.concatenate(owners), np.concatenate(stands)
 
 

@@ -89,9 +89,9 @@ def heights(species: Species, years: Floats) -> Floats:
 def ages_of_heights(species: Species, ratio: Floats) -> Floats:
     """Ages (n,) at which plants have heights (n,), over that at the full age; the oldest of health for taller ones."""
     ages = ages_of(species)
-    log_years, found = _heights(ages)
+    log_years, ratios = _heights(ages)
     rising = log_years <= np.log(ages.full if ages.scaled else ages.decline * ages.lifespan)
-    return np.where(ratio == 1.0, ages.full, np.exp(np.interp(ratio, found[rising], log_years[rising])))
+    return np.where(ratio == 1.0, ages.full, np.exp(np.interp(ratio, ratios[rising], log_years[rising])))
 
 
 def at_age(species: Species, years: float, dead: float = 0.0, crowded: bool = False) -> Species:
@@ -137,27 +137,27 @@ def sized(
     scale, crown = seeds.scale.copy(), np.tile(PLAIN, (len(seeds), 1))
     left = None if ages is None else ages.copy()
     for index, kind in enumerate(seeds.identifiers):
-        own = np.flatnonzero((seeds.species == index) & ((sizes.height > 0.0) | (sizes.dead > 0.0)))
-        if not len(own):
+        row = np.flatnonzero((seeds.species == index) & ((sizes.height > 0.0) | (sizes.dead > 0.0)))
+        if not len(row):
             continue
         with suppress(SpeciesError):
             if (species := find(kind)) is None:
                 continue
             if Kind.read(kind).skeleton:  # it is as it was drawn
-                scale[own] *= measure_of(species).fitted(seeds.take(own), sizes.take(own))[0]
+                scale[row] *= measure_of(species).fitted(seeds.take(row), sizes.take(row))[0]
                 continue
-            some = sizes.take(own)
-            stages, which = np.unique(_stages(species, some, index), axis=0, return_inverse=True)
+            recorded = sizes.take(row)
+            stages, which = np.unique(_stages(species, recorded, index), axis=0, return_inverse=True)
             for n, (age, dead, crowded) in enumerate(stages.tolist()):
                 here = which.reshape(-1) == n
-                these = own[here]
-                measure = (_still if some.lives is None or dead else _grown)(species, age, bool(crowded))
-                own_scale, own_crown = measure.fitted(seeds.take(these), some.take(here))
+                these = row[here]
+                measure = (_still if recorded.lives is None or dead else _grown)(species, age, bool(crowded))
+                own_scale, own_crown = measure.fitted(seeds.take(these), recorded.take(here))
                 scale[these] *= own_scale
                 crown[these], number[these] = own_crown, len(kinds)
                 kinds.append(str(Kind.read(kind).aged(age, dead, bool(crowded))))
             if left is not None:
-                left[own] = 0.0
+                left[row] = 0.0
     crown = None if (crown == PLAIN).all() else crown
     seeds = replace(seeds, identifiers=tuple(kinds), species=number, scale=scale, crown=crown)
     return seeds, None if left is None or not left.any() else left
@@ -169,16 +169,16 @@ def fits_of(seeds: Seeds, sizes: Sizes, find: Callable[[str], Species]) -> Float
     plain, _ = sized(seeds, None, replace(sizes, fit=out), find)
     crown = np.tile(PLAIN, (len(seeds), 1)) if plain.crown is None else plain.crown
     for number, text in enumerate(plain.identifiers):
-        own, kind = np.flatnonzero((plain.species == number) & (sizes.height > 0.0)), Kind.read(text)
-        if len(own) and kind.age and not kind.dead:
+        row, kind = np.flatnonzero((plain.species == number) & (sizes.height > 0.0)), Kind.read(text)
+        if len(row) and kind.age and not kind.dead:
             flora = _still(find(kind.species), kind.age, kind.crowded).flora
-            one = replace(plain.take(own), identifiers=(text,), species=np.zeros(len(own), np.int32), crown=crown[own])
-            tall, wide = (sizes.height * seeds.scale)[own], (sizes.width * seeds.scale)[own]
+            one = replace(plain.take(row), identifiers=(text,), species=np.zeros(len(row), np.int32), crown=crown[row])
+            tall, wide = (sizes.height * seeds.scale)[row], (sizes.width * seeds.scale)[row]
             # What has no width keeps that of its kind.
             bare, known = np.flatnonzero(wide <= 0.0), np.flatnonzero(wide > 0.0)
-            out[own[bare], 0] = tall[bare] / measured(flora, one.take(bare))[0]
+            out[row[bare], 0] = tall[bare] / measured(flora, one.take(bare))[0]
             scale, limbs = fitted(flora, one.take(known), tall[known], wide[known], _MEASURED).T
-            out[own[known]] = np.stack([scale, scale * limbs], axis=1)
+            out[row[known]] = np.stack([scale, scale * limbs], axis=1)
     return out
 
 
@@ -233,13 +233,13 @@ def _crowded(species: Species, sizes: Sizes, number: int) -> Mask:
 
 def _cohort_ages(species: Species, lives: Lives, number: int, full: float) -> Floats:
     """Present age of the cohort of each plant of a kind, at its first record; of all records (n,)."""
-    own = np.flatnonzero((lives.species == number) & (lives.dead <= 0.0) & (lives.height > 0.0))
+    records = np.flatnonzero((lives.species == number) & (lives.dead <= 0.0) & (lives.height > 0.0))
     out = np.ones(len(lives.year))
-    if not len(own):
+    if not len(records):
         return out
-    year, age = lives.year[own], ages_of_heights(species, np.maximum(lives.height[own], 1e-3) / full)
-    begins = np.flatnonzero(np.diff(lives.first[own], prepend=-1))
-    ends = np.append(begins[1:], len(own)) - 1
+    year, age = lives.year[records], ages_of_heights(species, np.maximum(lives.height[records], 1e-3) / full)
+    begins = np.flatnonzero(np.diff(lives.first[records], prepend=-1))
+    ends = np.append(begins[1:], len(records)) - 1
     birth = year[begins] - age[begins]
     life = np.stack([birth, np.log(age[ends]), np.log(np.maximum(year[ends] - birth, 1.0))], axis=1) / _APART
     # The most frequent lives are cohorts, and each plant is of the nearest one.
@@ -247,18 +247,18 @@ def _cohort_ages(species: Species, lives: Lives, number: int, full: float) -> Fl
     main = cells[np.argsort(-count, kind="stable")[:_COHORTS]]
     cohort = np.argmin(np.stack([((life - one) ** 2).sum(axis=1) for one in main]), axis=0)
     # Mean ages by spans of years, of all records; they only rise.
-    lengths = np.diff(np.append(begins, len(own)))
+    lengths = np.diff(np.append(begins, len(records)))
     spans = int((year.max() - year.min()) / _STRETCH) + 1
     cell = np.repeat(cohort, lengths) * spans + ((year - year.min()) / _STRETCH).astype(np.int64)
     sums = (np.bincount(cell, values, len(main) * spans) for values in (None, year, np.log(age)))
-    weight, at, log_age = (values.reshape(-1, spans) for values in sums)
+    weight, years, log_age = (values.reshape(-1, spans) for values in sums)
     present = np.ones(len(main))
     for n in range(len(main)):
-        some = weight[n] > 0
-        if some.any():
-            curve = np.maximum.accumulate(log_age[n, some] / weight[n, some])
-            present[n] = np.exp(np.interp(lives.now, at[n, some] / weight[n, some], curve))
-    out[lives.first[own[begins]]] = present[cohort]
+        filled = weight[n] > 0
+        if filled.any():
+            curve = np.maximum.accumulate(log_age[n, filled] / weight[n, filled])
+            present[n] = np.exp(np.interp(lives.now, years[n, filled] / weight[n, filled], curve))
+    out[lives.first[records[begins]]] = present[cohort]
     return out
 
 
@@ -319,8 +319,8 @@ class Measure:
         if has.any():
             shaped = trunks(self.flora.rows, replace(one, scale=scale, crown=forms))
             place = np.minimum(_BREAST / shaped.length, 0.95)
-            own = 2.0 * radius_at(self.flora.rows, shaped, place)
-            forms[:, THICKNESS] = np.where(has & (place < 0.95), sizes.diameter / np.maximum(own, 1e-9), 1.0)
+            diameter = 2.0 * radius_at(self.flora.rows, shaped, place)
+            forms[:, THICKNESS] = np.where(has & (place < 0.95), sizes.diameter / np.maximum(diameter, 1e-9), 1.0)
         if wide.any():
             species = self.flora.species[0]
             needs = ecology_of(species if species.aged is None else species.aged[0])
@@ -328,8 +328,8 @@ class Measure:
             plants = (trunks(self.flora.rows, replace(one, scale=scale, crown=form)) for form in (none, every))
             bare, drawn = (one_sided(species) * self.flora.leaf_areas(plant) for plant in plants)
             wanted = crown_leaves(needs.leaves, *np.where(wide, [sizes.height, sizes.base, sizes.width / 2], 1.0))
-            some = wide & (drawn > bare) & (needs.height >= _WOODY)
-            forms[:, LEAVES] = np.where(some, (wanted - bare) / np.where(some, drawn - bare, 1.0), 1.0)
+            leafy = wide & (drawn > bare) & (needs.height >= _WOODY)
+            forms[:, LEAVES] = np.where(leafy, (wanted - bare) / np.where(leafy, drawn - bare, 1.0), 1.0)
         return scale, crown_shapes(len(seeds), *forms.T)
 
 
@@ -357,5 +357,5 @@ def _grown(species: Species, years: float, crowded: bool) -> Measure:
 def _heights(ages: Ages) -> tuple[Floats, Floats]:
     """Logarithms of ages and heights; the same ones whatever plants there are."""
     years = np.geomspace(1e-3, 2.0 * MOST_YEARS, _NODES)
-    found = np.array([ages.heights(year) for year in years.tolist()])
-    return np.log(years), np.minimum(found, 1.0) if ages.scaled else found
+    ratios = np.array([ages.heights(year) for year in years.tolist()])
+    return np.log(years), np.minimum(ratios, 1.0) if ages.scaled else ratios

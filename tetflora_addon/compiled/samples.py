@@ -74,7 +74,7 @@ class Samples:
 
 
 def draw_samples(
-    rows: Table, leaf_area: Floats, wood_area: Floats, length: Floats, some: Container[int], times: int
+    rows: Table, leaf_area: Floats, wood_area: Floats, length: Floats, sampled: Container[int], times: int
 ) -> Samples:
     """Sample rows.
 
@@ -85,7 +85,7 @@ def draw_samples(
         Expected area in a sub-plant by the row that contributes it.
     length : (r,) float64
         Typical length of a branch, meters.
-    some : container of int
+    sampled : container of int
         Which rows.
     times : int
         So many times as many as proxies need.
@@ -94,7 +94,7 @@ def draw_samples(
     trunk = np.flatnonzero(np.diff(rows["species"], prepend=-1))
     for first, end in zip(trunk, [*trunk[1:], len(rows)], strict=True):
         walk = _Walk(rows, int(first), int(end), leaf_area, length, times)
-        for row in filter(some.__contains__, range(first, end)):
+        for row in filter(sampled.__contains__, range(first, end)):
             for points, area, out in ((walk.leaves, leaf_area, leaves), (walk.wood, wood_area, wood)):
                 if area[row].sum() > 0:
                     out.append((row, *walk.sampled(points, row, area[row])))
@@ -249,17 +249,17 @@ class _Walk:
         """
         i = row - self.first
         number = np.zeros(0) if points is None else points.line[:, self.slot[i]] - self.start[i]
-        own = np.flatnonzero((number >= 0) & (number < len(self.branches[i])))
-        if len(own) == 0 or expected[points.row[own]].sum() == 0:
+        borne = np.flatnonzero((number >= 0) & (number < len(self.branches[i])))
+        if len(borne) == 0 or expected[points.row[borne]].sum() == 0:
             # So rare that no path has met any: they are taken to be where the branches of the row itself are.
             points = replace(self.wood, row=np.full_like(self.wood.row, expected.argmax()))
-            own = np.flatnonzero(self.wood.row == row)
+            borne = np.flatnonzero(self.wood.row == row)
         # Each row has its expected area; paths only give its distribution.
-        met = np.bincount(points.row[own], points.area[own], len(expected))
-        area = points.area[own] * (expected / np.where(met > 0, met, 1))[points.row[own]]
-        base, under = self.branches[i], points.line[own, self.slot[i]] - self.start[i]
-        place = _in_bands(points, own, base, under)
-        group, numbers = np.zeros(len(own), np.int64), np.full(_CLASSES, int(self.times * SAMPLES * self.fraction[i]))
+        met = np.bincount(points.row[borne], points.area[borne], len(expected))
+        area = points.area[borne] * (expected / np.where(met > 0, met, 1))[points.row[borne]]
+        base, under = self.branches[i], points.line[borne, self.slot[i]] - self.start[i]
+        place = _in_bands(points, borne, base, under)
+        group, numbers = np.zeros(len(borne), np.int64), np.full(_CLASSES, int(self.times * SAMPLES * self.fraction[i]))
         first = np.zeros(_CLASSES, np.int64)
         if self.rows["tropic"][row]:
             group = _GROUPS[_stand_classes(base.frame[:, 2, :])][under]
@@ -269,7 +269,7 @@ class _Walk:
             pick = systematic(area, group, place, distinct)
         else:
             pick = systematic(area, group, place, numbers[:1])
-        picked, base = points.take(own[pick]), base.take(under[pick])
+        picked, base = points.take(borne[pick]), base.take(under[pick])
         on = picked.line[:, self.slot] - self.start
         limbs = _limbs_of(self.rows, self.first, i, on, self.branches, picked.row, base)
         return replace(self._local(picked, base, i), limbs=limbs), first, numbers
@@ -286,9 +286,9 @@ class _Walk:
         return replace(points, position=(axis * way.T[:, None]).sum(axis=0).T, frame=frame)
 
 
-def _in_bands(points: _Points, own: Integers, base: Branches, under: Integers) -> Floats:
+def _in_bands(points: _Points, borne: Integers, base: Branches, under: Integers) -> Floats:
     """Where points are (n,), 0 to 1: bands along the branch, and within each from the axis outwards."""
-    way = gathered(points.position, own) - gathered(base.position, under)
+    way = gathered(points.position, borne) - gathered(base.position, under)
     along = dot(way, gathered(base.frame[:, :, 2], under))
     across = np.sqrt(np.maximum(dot(way, way) - along * along, 0))[:, 0]
     length = np.maximum(base.length[under], 1e-12)
@@ -325,22 +325,22 @@ def _leaf_points(rows: Table, one: _Arrived, lines: Axes) -> _Points:
     return _Points.on(rows, one, picked, leaves.position, leaves.frame, outward, light, young, area)
 
 
-def _joined(found: list[tuple[int, _Points, Integers, Integers]], rows: int) -> Points:
+def _joined(samples: list[tuple[int, _Points, Integers, Integers]], rows: int) -> Points:
     """Samples of one row after the other: row, points, and first sample and number of each class."""
     first, number = np.zeros((2, rows, _CLASSES), np.int64)
     of_row: list[int] = []
-    for row, points, begins, counts in found:
+    for row, points, begins, counts in samples:
         first[row], number[row] = len(of_row) + begins, counts
         of_row += [row] * len(points.row)
-    parts = [points for _, points, *_ in found]
+    parts = [points for _, points, *_ in samples]
 
     def whole(name: str, shape: tuple[int, ...] = (), kind: type = np.float32) -> NDArray:
         return np.concatenate([np.zeros((0, *shape)), *(getattr(p, name) for p in parts)]).astype(kind, "C")
 
     limbs = Limbs.concatenate([p.limbs for p in parts])
     numbers = (whole(name) for name in ("outward", "light", "young"))
-    own = whole("position", (3,)), whole("frame", (3, 3)), whole("row", (), np.int32), *numbers
-    return Points(first, number, *own, limbs, Shares.of(limbs, np.array(of_row, np.int64), rows))
+    columns = whole("position", (3,)), whole("frame", (3, 3)), whole("row", (), np.int32), *numbers
+    return Points(first, number, *columns, limbs, Shares.of(limbs, np.array(of_row, np.int64), rows))
 
 
 #: Classes of samples: on the trunk itself, on stems beyond forks, on limbs of the one and of the others.
@@ -385,18 +385,18 @@ def _limbs_of(
     trunks = np.flatnonzero((species["order"] == 0) & ~species["drawn"] & ~species["phantom"])
     if i not in trunks:
         return out
-    within = (number >= 0) & (number < [len(some) for some in branches])
+    within = (number >= 0) & (number < [len(group) for group in branches])
     out.kind[within[:, trunks[trunks > i]].any(axis=1)] = STEM
     for limb in np.unique(species["next"][trunks][:, (LATERAL, DEAD)]) - first:
         # What is on a dead branch of a limb is on that limb: rows of living branches come first.
-        some = np.flatnonzero(within[:, limb] & (out.kind < LIMB)) if limb >= 0 else np.zeros(0, np.intp)
-        if len(some):
-            own = branches[limb].take(number[some, limb])
-            way = own.position - base.position[some]
-            out.root[some] = np.einsum("nji,nj->ni", base.frame[some], way) / base.length[some, None]
-            out.kind[some] += LIMB
-            weight = rows["count_by_length"][own.row]
-            longer = weight * own.vigor
+        group = np.flatnonzero(within[:, limb] & (out.kind < LIMB)) if limb >= 0 else np.zeros(0, np.intp)
+        if len(group):
+            limbs = branches[limb].take(number[group, limb])
+            way = limbs.position - base.position[group]
+            out.root[group] = np.einsum("nji,nj->ni", base.frame[group], way) / base.length[group, None]
+            out.kind[group] += LIMB
+            weight = rows["count_by_length"][limbs.row]
+            longer = weight * limbs.vigor
             follows = longer / np.maximum(1 - weight + longer, 1e-12)
-            out.follows[some] = np.where(row[some] == own.row, 0.0, follows)
+            out.follows[group] = np.where(row[group] == limbs.row, 0.0, follows)
     return out

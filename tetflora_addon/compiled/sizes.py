@@ -109,12 +109,12 @@ def crown_of(species: Species) -> Crown:
     SpeciesError
         A leaf is still the name of a Blender object.
     """
-    found = _known.get(species)
-    if found is None:
+    crown = _known.get(species)
+    if crown is None:
         while len(_known) >= _MOST:
             _known.pop(next(iter(_known)), None)
-        found = _known[species] = _crown_of(species)
-    return found
+        crown = _known[species] = _crown_of(species)
+    return crown
 
 
 def prepare(species: Species) -> None:
@@ -143,10 +143,10 @@ def _crown_of(species: Species) -> Crown:
     colors = np.stack([flora.leaf_colors(trunk).mean(axis=0), flora.wood_color[row]])
     color = tuple((areas @ colors / areas.sum()).tolist())
     polygons = expected_polygons(flora.species[0])
-    forms = tuple(next(iter(own), None) for own in flora.forms[0])
+    forms = tuple(next(iter(group), None) for group in flora.forms[0])
     samples = flora.samples_of((row,), _FINER)
-    own = _leaf_parts(flora, samples.leaves, row, trunk.length), _branch_parts(flora, samples.wood, row, trunk.length)
-    parts = CrownParts.concatenate(own)
+    group = _leaf_parts(flora, samples.leaves, row, trunk.length), _branch_parts(flora, samples.wood, row, trunk.length)
+    parts = CrownParts.concatenate(group)
     return Crown(radius, height, polygons, base, float(leaves.mean()), float(wood.mean()), color, forms, parts)
 
 
@@ -229,8 +229,8 @@ def measured(flora: Flora, seeds: Seeds) -> tuple[Floats, Floats]:
     """
     height, width = np.zeros((2, len(seeds)))
 
-    def work(some: Integers) -> None:
-        height[some], width[some], _ = _sizes(flora.in_leaf, seeds.take(some))
+    def work(plants: Integers) -> None:
+        height[plants], width[plants], _ = _sizes(flora.in_leaf, seeds.take(plants))
 
     _by_kind(flora, seeds, work)
     return height, width
@@ -254,25 +254,25 @@ def fitted(flora: Flora, seeds: Seeds, height: Floats, width: Floats, times: int
     """
     out = np.ones((len(seeds), 2))
 
-    def work(some: Integers) -> None:
-        own, wanted, factor = seeds.take(some), width[some] / height[some], np.ones(len(some))
-        crown = np.tile(PLAIN, (len(own), 1)) if own.crown is None else own.crown
-        most = np.where(are_stools(flora.rows, flora.first_row[own.species]), MOST_LEANING, MOST[WIDTH])
-        tall, left = np.ones(len(own)), np.arange(len(own))
+    def work(plants: Integers) -> None:
+        batch, wanted, factor = seeds.take(plants), width[plants] / height[plants], np.ones(len(plants))
+        crown = np.tile(PLAIN, (len(batch), 1)) if batch.crown is None else batch.crown
+        most = np.where(are_stools(flora.rows, flora.first_row[batch.species]), MOST_LEANING, MOST[WIDTH])
+        tall, left = np.ones(len(batch)), np.arange(len(batch))
         for _ in range(times):
             shaped = crown[left]
             shaped[:, WIDTH] *= factor[left]
-            tall[left], _, found = _sizes(flora.in_leaf, replace(own.take(left), crown=shaped))
-            if found is None:
+            tall[left], _, outer_limbs = _sizes(flora.in_leaf, replace(batch.take(left), crown=shaped))
+            if outer_limbs is None:
                 break
-            more = _solved(found, wanted[left], LEAST[WIDTH] / shaped[:, WIDTH], most[left] / shaped[:, WIDTH])
+            more = _solved(outer_limbs, wanted[left], LEAST[WIDTH] / shaped[:, WIDTH], most[left] / shaped[:, WIDTH])
             far = np.abs(more - 1) > _CLOSE  # plants that are close are left alone, whatever others need
-            tall[left] = np.where(far, found.sizes(more)[0], tall[left])
+            tall[left] = np.where(far, outer_limbs.sizes(more)[0], tall[left])
             factor[left] *= np.where(far, more, 1.0)
             left = left[far]
             if not len(left):
                 break
-        out[some] = np.stack([height[some] / tall, factor], axis=1)
+        out[plants] = np.stack([height[plants] / tall, factor], axis=1)
 
     _by_kind(flora, seeds, work)
     return out
@@ -282,10 +282,10 @@ def _by_kind(flora: Flora, seeds: Seeds, work: Callable[[Integers], None]) -> No
     """Do some work on some plants (k,) at a time, each kind apart, as kinds have more or fewer limbs."""
     order = np.argsort(seeds.species, kind="stable")
     kinds = np.split(order, np.flatnonzero(np.diff(seeds.species[order])) + 1)
-    for some in kinds:
-        if len(some):
-            _beyond(flora.in_leaf, int(seeds.species[some[0]]))
-    each_on_all_cores(work, [some[i : i + _BATCH] for some in kinds for i in range(0, len(some), _BATCH)])
+    for plants in kinds:
+        if len(plants):
+            _beyond(flora.in_leaf, int(seeds.species[plants[0]]))
+    each_on_all_cores(work, [plants[i : i + _BATCH] for plants in kinds for i in range(0, len(plants), _BATCH)])
 
 
 def _beyond(flora: Flora, species: int) -> "TwigReach":
@@ -301,16 +301,16 @@ def _sizes(flora: Flora, seeds: Seeds) -> "tuple[Floats, Floats, OuterLimbs | No
     if beyond.whole[0] > 0:
         shaped = 1.0 if plants.crown is None else length_factors(flora.rows, plants.row, plants.crown)
         return beyond.whole[0] * (plants.length / shaped), beyond.whole[1] * (plants.length / shaped), None
-    found = outermost(flora.rows, plants, beyond)
-    return *found.sizes(), found
+    outer_limbs = outermost(flora.rows, plants, beyond)
+    return *outer_limbs.sizes(), outer_limbs
 
 
-def _solved(found: "OuterLimbs", wanted: Floats, least: Floats, most: Floats) -> Floats:
+def _solved(outer_limbs: "OuterLimbs", wanted: Floats, least: Floats, most: Floats) -> Floats:
     """Factors (n,) on limbs, between limits (n,), by which crown widths over heights become what is wanted (n,)."""
     low, high = least, np.maximum(most, least)
     for _ in range(_BISECTIONS):
         middle = np.sqrt(low * high)
-        height, width = found.sizes(middle)
+        height, width = outer_limbs.sizes(middle)
         narrow = width < wanted * height
         low, high = np.where(narrow, middle, low), np.where(narrow, high, middle)
     return np.sqrt(low * high)
@@ -371,9 +371,9 @@ def outermost(rows: Table, plants: Branches, beyond: TwigReach) -> OuterLimbs:
     for (grown, lines), (counts, which, index) in zip(stems, chosen, strict=True):
         origin = plants.position[grown.plant]
         owner.append(grown.plant)
-        own = _farthest(lines, origin)
-        own[:, UP] += beyond.top * grown.scale
-        root.append(own)
+        reach = _farthest(lines, origin)
+        reach[:, UP] += beyond.top * grown.scale
+        root.append(reach)
         limb.append(np.zeros((len(grown), len(DIRECTIONS))))
         stem.append(rows["continues"][grown.row])
         limbs = chosen_children(rows, grown, lines, which, index, counts)
@@ -395,9 +395,9 @@ def outermost(rows: Table, plants: Branches, beyond: TwigReach) -> OuterLimbs:
         root.append(begin)
         limb.append(leads)
     width = np.ones(len(plants)) if plants.crown is None else plants.crown[:, WIDTH].astype(np.float64)
-    plant, root, limb, stem = (np.concatenate(some) for some in (owner, root, limb, stem))
+    plant, root, limb, stem = (np.concatenate(blocks) for blocks in (owner, root, limb, stem))
     order = np.argsort(plant, kind="stable")
-    root, limb = (np.ascontiguousarray(some[order].T) for some in (root, limb))
+    root, limb = (np.ascontiguousarray(blocks[order].T) for blocks in (root, limb))
     return OuterLimbs(plant[order], root, limb, stem[order], width)
 
 
@@ -426,9 +426,9 @@ def _in_ways(place: Floats) -> Floats:
 
 def _likely(rows: Table, stems: list[tuple[Branches, Axes]], n: int) -> list[tuple[Integers, Integers, Integers]]:
     """Limbs of stems that are likely to reach farthest: by generation counts, stems (m,) and limbs (m,) of these."""
-    found = [_mean_tips(rows, *one) for one in stems]
-    tree = np.concatenate([grown.plant[owner] for (grown, _), (_, owner, _, _) in zip(stems, found, strict=True)])
-    tips = np.concatenate([tip for *_, tip in found])
+    limbs = [_mean_tips(rows, *one) for one in stems]
+    tree = np.concatenate([grown.plant[owner] for (grown, _), (_, owner, _, _) in zip(stems, limbs, strict=True)])
+    tips = np.concatenate([tip for *_, tip in limbs])
     order = np.argsort(tree, kind="stable")
     number = np.bincount(tree, minlength=n)
     of, place = spread(number)
@@ -442,11 +442,11 @@ def _likely(rows: Table, stems: list[tuple[Branches, Axes]], n: int) -> list[tup
             np.put_along_axis(chosen, best, True, axis=1)
     else:
         chosen[:] = True
-    some = np.zeros(len(tree), bool)
-    some[order] = chosen[of, place]
+    kept = np.zeros(len(tree), bool)
+    kept[order] = chosen[of, place]
     out, start = [], 0
-    for counts, owner, index, _ in found:
-        mine = np.flatnonzero(some[start : start + len(owner)])
+    for counts, owner, index, _ in limbs:
+        mine = np.flatnonzero(kept[start : start + len(owner)])
         out.append((counts, owner[mine], index[mine]))
         start += len(owner)
     return out
@@ -469,10 +469,10 @@ def _mean_tips(rows: Table, stems: Branches, lines: Axes) -> tuple[Integers, Int
     grown = living_nodes(rows, stems, LATERAL)
     if grown is not None:
         number, _, extra = grown.chosen(owner, index, whorl)
-        there, among, described = grown.places(owner, number // whorl, np.full(len(owner), 0.5), extra)
+        place, among, described = grown.places(owner, number // whorl, np.full(len(owner), 0.5), extra)
         on = grown.on[owner]
         least = whorl / np.maximum(counts, 1)[owner]  # the lowest may be anywhere in their node
-        t, part = np.where(on, there, t), np.where(on, np.maximum(among, least), part)
+        t, part = np.where(on, place, t), np.where(on, np.maximum(among, least), part)
         first, last = rows["fraction"][row, LATERAL].T
         described = first[owner] + (last - first)[owner] * described
         fading = faded(described, rows["growing"][row, LATERAL, FADES][owner], extra)
@@ -507,10 +507,10 @@ def beyond_limbs(rows: Table, first: int, species: int) -> TwigReach:
     limbs, over = [], 0.0
     for grown, lines in [] if rows["phantom"][first] else _stems(rows, plants):
         owner, tip = _leaf_tips(rows, grown, lines)
-        own = lines.knots[:, :, 2].max(axis=1)
-        highest = own.copy()
+        stem_top = lines.knots[:, :, 2].max(axis=1)
+        highest = stem_top.copy()
         np.maximum.at(highest, owner, tip[:, 2])
-        over = max(over, float((highest - own).mean()))
+        over = max(over, float((highest - stem_top).mean()))
         if (rows["next"][grown.row, LATERAL] >= 0).any():
             counts = branch_counts(rows, grown)
             owner, index = spread(counts)
@@ -535,8 +535,8 @@ def _fitted(rows: Table, limbs: Branches, up: bool) -> tuple[float, float]:
     end = lines.knot(every, lines.segments) - limbs.position
     way = end * [1.0, 1.0, 0.0] if not up else np.broadcast_to(DIRECTIONS[UP], end.shape)
     way = way / np.maximum(np.linalg.norm(way, axis=1), 1e-9)[:, None]
-    own = np.einsum("nsi,ni->ns", lines.knots - limbs.position[:, None], way).max(axis=1)
-    over = _all_extremes(rows, limbs, way[:, None])[:, 0] - own
+    reach = np.einsum("nsi,ni->ns", lines.knots - limbs.position[:, None], way).max(axis=1)
+    over = _all_extremes(rows, limbs, way[:, None])[:, 0] - reach
     terms = np.stack([np.ones(len(limbs)), limbs.length], axis=1)
     (meters, part), *_ = np.linalg.lstsq(terms, over, rcond=None)
     luck = _LUCK * (over - terms @ [meters, part]).std() / limbs.length.mean()

@@ -128,20 +128,20 @@ class PlacedClusters(FrontierKind):
         if not self.originals.kites:
             # An instance costs as much as three facets: all that is seen is real, but for specks.
             pixels = pixels * FARTHER
-        some = explicit_fraction(pixels, self.limit)
+        explicit = explicit_fraction(pixels, self.limit)
         # A card or a leaf of two triangles is no more than a kite.
         plain = (self.placed.assets.leaf_faces[rows.cluster] <= SIMPLE) | (not self.originals.kites)
-        return some, np.where(plain, some, some * explicit_fraction(pixels, KITES))
+        return explicit, np.where(plain, explicit, explicit * explicit_fraction(pixels, KITES))
 
     def met(self, rows: ClusterRows, shown: list[Shown]) -> ClusterRows:
         """As of `FrontierKind`."""
         assets, asset = self.placed.assets, self.placed.instances.asset[rows.instance]
-        some, full = self.explicit(rows)
+        explicit, full = self.explicit(rows)
         number = uniform(self.placed.keys(rows), Draw.TRANSITION)
         whole = ~rows.shown & (rows.cluster == assets.root[asset]) & (full >= self.originals.fraction)
-        own = ~rows.shown & ~whole & (self.placed.assets.mesh_of[rows.cluster] == rows.cluster)
-        mesh = own & (number < full)
-        kites = own & ~mesh & (number < some) & (assets.clusters.leaves[rows.cluster] > 0)
+        candidates = ~rows.shown & ~whole & (self.placed.assets.mesh_of[rows.cluster] == rows.cluster)
+        mesh = candidates & (number < full)
+        kites = candidates & ~mesh & (number < explicit) & (assets.clusters.leaves[rows.cluster] > 0)
         for what, chosen in (("original", whole), ("cluster", mesh), ("kites", kites)):
             if chosen.any():
                 shown.append((what, rows.take(np.flatnonzero(chosen))))
@@ -150,35 +150,35 @@ class PlacedClusters(FrontierKind):
     def draw(self, canvas: Canvas, slab: Waiting, side: Floats, _shown: list[Shown]) -> None:
         """As of `FrontierKind`."""
         rows = slab.parts
-        facets = np.flatnonzero(~rows.shown)
-        for whose, made in self._facets(rows.take(facets), side[facets]):
-            canvas.add_facets(whose, made)
-        some = rows.take(np.flatnonzero(rows.shown))
-        faces = 0.0 if self.originals.shared else some.totals.polygons.sum()
-        wide = self._wide(some)
-        near = some.take(np.flatnonzero(wide))
+        rest = np.flatnonzero(~rows.shown)
+        for whose, facets in self._facets(rows.take(rest), side[rest]):
+            canvas.add_facets(whose, facets)
+        drawn = rows.take(np.flatnonzero(rows.shown))
+        faces = 0.0 if self.originals.shared else drawn.totals.polygons.sum()
+        wide = self._wide(drawn)
+        near = drawn.take(np.flatnonzero(wide))
         for run in chunks(self.placed.assets.clusters.leaves[near.cluster], _KITES_BATCH):
             canvas.add_shown(self.placed.kites(near.take(run)))
         # Wood, and leaves of few pixels.
-        totals = facet_totals(self.placed, some)
+        totals = facet_totals(self.placed, drawn)
         totals = replace(totals, leaf_area=np.where(wide, 0.0, totals.leaf_area))
-        least = COVERING * self.camera.extent_around(some.center)
-        made = facets_of_assets(self.placed, some, totals, np.maximum(least, np.sqrt(self.one_leaf(some))), least)
-        canvas.add_shown(triangle_corners(made), float(faces))
+        least = COVERING * self.camera.extent_around(drawn.center)
+        facets = facets_of_assets(self.placed, drawn, totals, np.maximum(least, np.sqrt(self.one_leaf(drawn))), least)
+        canvas.add_shown(triangle_corners(facets), float(faces))
 
     def unseen(self, rows: ClusterRows, side: Floats, kept: Floats, _shown: list[Shown]) -> Iterator[Owned]:
         """As of `FrontierKind`."""
-        some = np.flatnonzero(~rows.shown)
-        yield from self._facets(rows.take(some), side[some], 1.0 - kept[some])
+        rest = np.flatnonzero(~rows.shown)
+        yield from self._facets(rows.take(rest), side[rest], 1.0 - kept[rest])
 
     def _facets(self, rows: ClusterRows, side: Floats, left_out: Floats | None = None) -> Iterator[Owned]:
         looks = self.looks[rows.instance]
         leaf = np.maximum(side, np.sqrt(self.one_leaf(rows)))
         for look in np.unique(looks).tolist():
-            some = np.flatnonzero(looks == look)
-            own, out = rows.take(some), None if left_out is None else left_out[some]
-            totals = facet_totals(self.placed, own)
-            yield (ASSETS, look), facets_of_assets(self.placed, own, totals, leaf[some], side[some], out)
+            alike = np.flatnonzero(looks == look)
+            clusters, out = rows.take(alike), None if left_out is None else left_out[alike]
+            totals = facet_totals(self.placed, clusters)
+            yield (ASSETS, look), facets_of_assets(self.placed, clusters, totals, leaf[alike], side[alike], out)
 
 
 def explicit_plan(result: Refinement, originals: OriginalPolicy) -> AssetPlan:
@@ -186,7 +186,7 @@ def explicit_plan(result: Refinement, originals: OriginalPolicy) -> AssetPlan:
     placed = result.assets.placed
     assets, asset, number = placed.assets, placed.instances.asset, len(placed.assets.clusters)
     parts, inside = inside_explicit(
-        result.assets, result, lambda own, inside: (assets.mesh_of[own.cluster] < 0) & (inside < 1.0)
+        result.assets, result, lambda clusters, inside: (assets.mesh_of[clusters.cluster] < 0) & (inside < 1.0)
     )
     while (above := (assets.mesh_of[parts.cluster] < 0) & (inside >= 1.0)).any():  # so are all that these consist of
         within, _ = placed.children(parts.take(above))
@@ -197,7 +197,7 @@ def explicit_plan(result: Refinement, originals: OriginalPolicy) -> AssetPlan:
     pair, of = np.unique(parts.instance[inner].astype(np.int64) * number + mesh[inner], return_inverse=True)
     area = parts.totals.optical_area[inner]
     most = np.bincount(of, area * inside[inner], len(pair)) >= 0.5 * np.bincount(of, area, len(pair))
-    own = placed.parts(*np.divmod(pair[most], max(number, 1)))
-    faces = np.bincount(own.instance, own.totals.polygons, len(placed))
+    clusters = placed.parts(*np.divmod(pair[most], max(number, 1)))
+    faces = np.bincount(clusters.instance, clusters.totals.polygons, len(placed))
     whole = originals.always[asset] | (faces >= originals.fraction * assets.clusters.faces[assets.root[asset]])
-    return AssetPlan(np.flatnonzero(whole), own.take(~whole[own.instance]))
+    return AssetPlan(np.flatnonzero(whole), clusters.take(~whole[clusters.instance]))

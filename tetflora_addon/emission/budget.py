@@ -216,21 +216,21 @@ class Stand:
         away = np.linalg.norm(self.foot - camera.eye, axis=1)
         size = np.maximum(self.radius, self._of_crowns("height"))
         # Places and scales without a number, or with one too large, are for Refine to tell; here they count as nothing.
-        there = np.isfinite(away + size)
-        away, size = (np.where(there, of, 0.0) for of in (away, size))
+        finite = np.isfinite(away + size)
+        away, size = (np.where(finite, of, 0.0) for of in (away, size))
         near = size / np.maximum(np.maximum(away, size), 1e-9)
         near = np.where(self.in_view(camera), near, near / _IN_VIEW)
         every = np.array([len(crown.parts) for crown in self.crowns])[self.which]
-        some = np.clip(np.ceil(_PARTS * near / max(near.sum(), 1e-9)), 1, every).astype(np.int64)
+        counts = np.clip(np.ceil(_PARTS * near / max(near.sum(), 1e-9)), 1, every).astype(np.int64)
         order = np.empty(len(self.foot), np.int64)  # by places: that of a scene's objects is chance
         order[np.lexsort(np.round(self.foot.T, 4))] = np.arange(len(self.foot))
         turn = order * GOLDEN_TURN
-        found, plants = [CrownParts.empty()], [np.zeros(0, np.int64)]
+        parts, plants = [CrownParts.empty()], [np.zeros(0, np.int64)]
         for number, crown in enumerate(self.crowns):
-            own = np.flatnonzero((self.which == number) & there)
-            owner, index = spread(some[own])
-            plant = own[owner]
-            each, scale = every[plant] / some[plant], self.scale[plant]
+            members = np.flatnonzero((self.which == number) & finite)
+            owner, index = spread(counts[members])
+            plant = members[owner]
+            each, scale = every[plant] / counts[plant], self.scale[plant]
             part = crown.parts.take(((index + turn[plant] % 1.0) * each).astype(np.int64) % every[plant])
             (x, y, z), angle = part.position.T * scale, order[plant] * GOLDEN_ANGLE
             x, y = np.cos(angle) * x - np.sin(angle) * y, np.sin(angle) * x + np.cos(angle) * y
@@ -243,9 +243,9 @@ class Stand:
                 length=part.length * scale,
                 reach=part.reach * scale,
             )
-            found.append(part)
+            parts.append(part)
             plants.append(plant)
-        return CrownParts.concatenate(found), np.concatenate(plants)
+        return CrownParts.concatenate(parts), np.concatenate(plants)
 
 
 @dataclass(frozen=True)
@@ -287,16 +287,16 @@ def estimate(
     seconds, memory = SECONDS + SECONDS_PER_PLANT * plants, used + BYTES_PER_PLANT * plants
     memory += BYTES_PER_PROCESS * processes
     if everything:
-        made = whole @ parts.number
-        memory += BYTES_PER_TRIANGLE * float(made[1])
-        return Estimate(plants, float(made[0]), seconds + float(SECONDS_EXPANDED @ made), memory, "")
+        faces = whole @ parts.number
+        memory += BYTES_PER_TRIANGLE * float(faces[1])
+        return Estimate(plants, float(faces[0]), seconds + float(SECONDS_EXPANDED @ faces), memory, "")
     wanted, opened = _numbers(stand, camera, settings, parts, plant, whole[0])
     most, limit = min((settings.max_polygons or np.inf, "Max Polygons"), (allowed / BYTES_PER_POLYGON, "Max Memory"))
-    made = min(wanted, (1.0 - RESERVE) * drawing.FULL * most)
-    seconds += SECONDS_MADE * made + float(SECONDS_OPENED @ opened) * made / max(wanted, 1.0)
+    faces = min(wanted, (1.0 - RESERVE) * drawing.FULL * most)
+    seconds += SECONDS_MADE * faces + float(SECONDS_OPENED @ opened) * faces / max(wanted, 1.0)
     busy = min(max(processes, 1) / max(camera.width // TILE, 1), 1.0)
-    memory += (BYTES_PER_POLYGON + busy * BYTES_IN_TILE) * made
-    return Estimate(plants, made, seconds, memory, limit if wanted > made else "")
+    memory += (BYTES_PER_POLYGON + busy * BYTES_IN_TILE) * faces
+    return Estimate(plants, faces, seconds, memory, limit if wanted > faces else "")
 
 
 def _numbers(
@@ -341,8 +341,8 @@ def _numbers(
         (leaves[~beside].sum(), OUTSIDE_A_PIXEL),
     ):
         unseen += min(float(number), max(a_pixel * pixels, NEVER_TOO_MANY) / coarser**2)
-    shown, there = (np.bincount(plant[inside], of, len(stand.number)) for of in (drawn_number, parts.number))
-    plants = stand.number @ (shown / np.maximum(there, 1e-9))
+    shown, total = (np.bincount(plant[inside], of, len(stand.number)) for of in (drawn_number, parts.number))
+    plants = stand.number @ (shown / np.maximum(total, 1e-9))
     return seen + unseen, np.array([np.sqrt(plants), (drawn_number * branch)[wood].sum()])
 
 
@@ -364,8 +364,8 @@ def _polygons(crowns: tuple[Crown, ...], parts: CrownParts, which: Integers, cam
     extent = camera.extent_around(parts.position)
     extent = np.maximum(extent - slope * parts.reach, extent / NEARER)
     out = np.ones((2, len(parts)))
-    for form, own in _by_form(crowns, parts, which):
-        out[:, own] = chosen_polygons(form, _SHARE * parts.length[own] / extent[own] / TOLERANCE)
+    for form, leaves in _by_form(crowns, parts, which):
+        out[:, leaves] = chosen_polygons(form, _SHARE * parts.length[leaves] / extent[leaves] / TOLERANCE)
     wood = np.flatnonzero(parts.form < 0)
     sides, size = parts.sides[wood], parts.width[wood] / extent[wood] / 2.0
     around, along = finer(sides, size)
@@ -378,8 +378,8 @@ def _polygons(crowns: tuple[Crown, ...], parts: CrownParts, which: Integers, cam
 def _kites(crowns: tuple[Crown, ...], parts: CrownParts, which: Integers) -> Floats:
     """Widths in pixels up to which leaves are kites, and have one for each plane; how many planes that are (3, n)."""
     out = np.ones((3, len(parts)))
-    for form, own in _by_form(crowns, parts, which):
-        out[:, own] = np.array([[*kite_widths([form]), leaf_planes(form).polygons]]).T
+    for form, leaves in _by_form(crowns, parts, which):
+        out[:, leaves] = np.array([[*kite_widths([form]), leaf_planes(form).polygons]]).T
     return out
 
 
@@ -387,9 +387,9 @@ def _by_form(crowns: tuple[Crown, ...], parts: CrownParts, which: Integers) -> I
     """Each known form of leaf, and those of parts (k,) that have it, of crowns (n,)."""
     for number, crown in enumerate(crowns):
         for kind, form in enumerate(crown.forms):
-            own = np.flatnonzero((which == number) & (parts.form == kind))
-            if form is not None and len(own):
-                yield form, own
+            leaves = np.flatnonzero((which == number) & (parts.form == kind))
+            if form is not None and len(leaves):
+                yield form, leaves
 
 
 def _through(stand: Stand, parts: CrownParts, plant: Integers, extent: Floats) -> Floats:
@@ -407,16 +407,16 @@ def _in_depth(parts: CrownParts, camera: Camera, pixels: Floats) -> tuple[Floats
     image = Coverage(camera, (0, 1))
     *place, depth = image.project(parts.position)
     sizes = (image.width, camera.width), (image.height, camera.height)  # with what lies around it, and without
-    x, y = (np.clip((of - (all_ - own) / 2) / own, 0.0, 1.0) for of, (all_, own) in zip(place, sizes, strict=True))
+    x, y = (np.clip((of - (all_ - core) / 2) / core, 0.0, 1.0) for of, (all_, core) in zip(place, sizes, strict=True))
     strips = max(round(np.sqrt(len(x) / _IN_CELL)), 1)
     column, wide = _groups(x, np.zeros(len(x), np.int64), strips)
     cell, tall = _groups(y, column, strips)
     size = np.maximum((wide[np.arange(len(tall)) // strips] * tall) * camera.width * camera.height, 1.0)
     order = np.lexsort((depth, cell))
-    layers, own = np.maximum(pixels / size[cell], 1e-12), cell[order]
+    layers, cells = np.maximum(pixels / size[cell], 1e-12), cell[order]
     every = np.bincount(cell, layers, len(size))
     before = np.empty(len(parts))
-    before[order] = np.cumsum(layers[order]) - layers[order] - (np.cumsum(every) - every)[own]
+    before[order] = np.cumsum(layers[order]) - layers[order] - (np.cumsum(every) - every)[cells]
     # A layer of what is turned all ways covers a part of its area.
     return before, layers, float(-(size * np.expm1(-LEVEL * every)).sum())
 
@@ -425,9 +425,9 @@ def _groups(place: Floats, group: Integers, number: int) -> tuple[Integers, Floa
     """Each group of things (n,) at places (n,) divided into so many of equally many: which (n,), and how wide (k,)."""
     order = np.lexsort((place, group))
     count = np.bincount(group)
-    own, rank = spread(count)
+    owner, rank = spread(count)
     out = np.empty(len(place), np.int64)
-    out[order] = own * number + rank * number // count[own]
+    out[order] = owner * number + rank * number // count[owner]
     many = np.bincount(out, minlength=len(count) * number)
     low, high = np.full(len(many), np.inf), np.full(len(many), -np.inf)
     np.minimum.at(low, out, place)
@@ -444,7 +444,7 @@ def coarse_faces(flora: Flora, seeds: Seeds) -> Floats:
     """Expected polygons (2,) of plants far from any camera, and the triangles that these consist of."""
     plants = trunks(flora.rows, seeds)
     every, wood = flora.face_counts(plants), flora.branch_faces(plants)
-    each = np.array([sum(f.triangles for f in own[0]) / max(sum(f.polygons for f in own[0]), 1) for own in flora.forms])
+    each = np.array([sum(f.triangles for f in leaf) / max(sum(f.polygons for f in leaf), 1) for leaf, _ in flora.forms])
     return np.array([every.sum(), (2.0 * wood + (every - wood) * each[flora.species_of(plants.row)]).sum()])
 
 
@@ -463,30 +463,30 @@ def expanded_faces(flora: Flora, seeds: Seeds, camera: Camera) -> Iterator[Float
     order = np.argsort(np.linalg.norm(plants.position - camera.position, axis=1) - across, kind="stable")
     detail = LeafDetail(flora, camera)
     rest = order[_ALL:]
-    some = rest[np.linspace(0, len(rest) - 1, min(_SOME, len(rest))).round().astype(np.int64)]
-    each = np.repeat([1.0, len(rest) / max(len(some), 1)], [min(_ALL, len(order)), len(some)])
-    for one, times in zip(np.concatenate([order[:_ALL], some]), each, strict=True):
+    sample = rest[np.linspace(0, len(rest) - 1, min(_SOME, len(rest))).round().astype(np.int64)]
+    each = np.repeat([1.0, len(rest) / max(len(sample), 1)], [min(_ALL, len(order)), len(sample)])
+    for one, times in zip(np.concatenate([order[:_ALL], sample]), each, strict=True):
         total = total + times * _more(flora, plants.take(one[None]), detail)
         yield total
 
 
 def _more(flora: Flora, plants: Branches, detail: LeafDetail) -> Floats:
     """Polygons and triangles (2,) of plants beyond those of the models of their species."""
-    found = np.zeros(2)
+    faces = np.zeros(2)
     for whole in expand(flora, plants):
         wood = tube_faces(flora, whole, detail.wood) - tube_faces(flora, whole)
-        found += _finer_leaves(flora, whole, detail) + wood * np.array([1.0, 2.0])
-    return found
+        faces += _finer_leaves(flora, whole, detail) + wood * np.array([1.0, 2.0])
+    return faces
 
 
 def _finer_leaves(flora: Flora, whole: WholeBranches, detail: LeafDetail) -> Floats:
     lengths, leaves = detail.lengths(whole), leaf_counts(flora.rows, whole.branches)
-    found, near = np.zeros(2), np.flatnonzero((lengths > 0.0) & (leaves > 0))
+    faces, near = np.zeros(2), np.flatnonzero((lengths > 0.0) & (leaves > 0))
     species = flora.rows["species"][whole.branches.row[near]]
     for s in np.unique(species):
-        own = near[species == s]
+        branches = near[species == s]
         forms = flora.forms[s][0]
-        each = [chosen_polygons(f, _SHARE * lengths[own]) for f in forms]
+        each = [chosen_polygons(f, _SHARE * lengths[branches]) for f in forms]
         plain = np.mean([(f.polygons, f.triangles) for f in forms], axis=0)
-        found += (np.mean(each, axis=0) - plain[:, None]) @ leaves[own]
-    return found
+        faces += (np.mean(each, axis=0) - plain[:, None]) @ leaves[branches]
+    return faces

@@ -97,8 +97,8 @@ class Coverage:
             reach = (radius, radius)
         elif camera.kind == "PANO":
             angle = np.arcsin(np.clip(radius / np.maximum(depth, 1e-9), 0.0, 1.0))
-            own = camera.to_camera_space(center)
-            cosine = np.hypot(own[:, 0], own[:, 2]) / np.maximum(depth, 1e-9)
+            local = camera.to_camera_space(center)
+            cosine = np.hypot(local[:, 0], local[:, 2]) / np.maximum(depth, 1e-9)
             reach = (angle / np.maximum(cosine - np.sin(angle), 1e-3), angle)
         else:
             # The silhouette of a sphere beside the axis is an ellipse, longer by its slope.
@@ -136,16 +136,16 @@ class Coverage:
 
         Returns these wider footprints (n), a mask (n,), and where the corners of all others are, block by block.
         """
-        prints, hidden, drawn = [self.of_corners(corners[:0])[0]], [np.zeros(0, bool)], []
+        footprints, hidden, drawn = [self.of_corners(corners[:0])[0]], [np.zeros(0, bool)], []
         for block in blocks(len(corners), _POLYGONS):
-            own, *places = self.of_corners(corners[block])
-            own = replace(own, low=own.low - np.float32(wider), high=own.high + np.float32(wider))
-            behind = self.hidden(own)
-            prints.append(own)
+            prints, *places = self.of_corners(corners[block])
+            prints = replace(prints, low=prints.low - np.float32(wider), high=prints.high + np.float32(wider))
+            behind = self.hidden(prints)
+            footprints.append(prints)
             hidden.append(behind)
             seen = np.flatnonzero(~behind)
             drawn.append(tuple(place[:, seen] for place in places))
-        return Footprints.concatenate(prints), np.concatenate(hidden), drawn
+        return Footprints.concatenate(footprints), np.concatenate(hidden), drawn
 
     def of_corners(self, corners: NDArray[np.floating]) -> tuple[Footprints, NDArray, NDArray, NDArray]:
         """Footprints of polygons with corners (n, k, 3), and the columns, rows and depths (k, n) of these."""
@@ -180,8 +180,8 @@ class Coverage:
         for other in camera.shutter:
             here = self.project(points)[:2] if here is None else here
             moved = replace(camera, position=other.position, frame=other.frame, shutter=())
-            there = _projected(moved, points, self._scale)
-            spread_ = np.maximum(spread_, np.hypot(there[0] - here[0], there[1] - here[1]))
+            shifted = _projected(moved, points, self._scale)
+            spread_ = np.maximum(spread_, np.hypot(shifted[0] - here[0], shifted[1] - here[1]))
         return spread_
 
     def outside(self, prints: Footprints) -> Mask:
@@ -224,13 +224,13 @@ class Coverage:
         y0 = np.clip(np.ceil(low_y - 0.5), 0, self.height).astype(np.int64)
         y1 = np.clip(np.floor(high_y - 0.5), -1, self.height - 1).astype(np.int64)
         wide, count = np.maximum(x1 - x0 + 1, 0), np.maximum(x1 - x0 + 1, 0) * np.maximum(y1 - y0 + 1, 0)
-        some = np.flatnonzero(ok & (count > 0))
-        if not len(some):
+        triangles = np.flatnonzero(ok & (count > 0))
+        if not len(triangles):
             return
         self._maxima = None
         flat = self.depth.reshape(-1)
-        for run in chunks(count[some], PAIRS_BATCH):
-            which = some[run]
+        for run in chunks(count[triangles], PAIRS_BATCH):
+            which = triangles[run]
             owner, index = spread(count[which])
             t = which[owner]
             dy, dx = np.divmod(index, wide[t])
@@ -244,10 +244,10 @@ class Coverage:
 def _projected(camera: Camera, points: NDArray[np.floating], scale: Floats) -> tuple[NDArray, NDArray, NDArray]:
     """`Coverage.project` for a camera with so many pixels (2,) for each unit of its window."""
     left, _, bottom, _ = camera.window
-    own = in_axes(points, camera.frame * [1.0, 1.0, -1.0], camera.position)
-    across, up, depth = np.moveaxis(own, -1, 0)
+    local = in_axes(points, camera.frame * [1.0, 1.0, -1.0], camera.position)
+    across, up, depth = np.moveaxis(local, -1, 0)
     if camera.kind == "PANO":
-        (across, up), depth = camera.longitude_latitude(own), np.linalg.norm(own, axis=-1)
+        (across, up), depth = camera.longitude_latitude(local), np.linalg.norm(local, axis=-1)
     elif camera.kind == "PERSP":
         ahead = np.maximum(depth, 1e-6)
         across, up = across / ahead, up / ahead
@@ -317,8 +317,8 @@ class Shade:
         self._table = (np.cumsum(table[:, :, ::-1], axis=2)[:, :, ::-1] - 0.5 * table).ravel()
 
     def _index(self, places: Floats) -> Integers:
-        at = np.clip(np.floor((places - self._low) / self._step), 0, self._size - 1).astype(np.int64)
-        return (at[:, 0] * self._size[1] + at[:, 1]) * self._size[2] + at[:, 2]
+        cell = np.clip(np.floor((places - self._low) / self._step), 0, self._size - 1).astype(np.int64)
+        return (cell[:, 0] * self._size[1] + cell[:, 1]) * self._size[2] + cell[:, 2]
 
     def depth(self, points: Floats, nearer: Floats | float = 0.0) -> Floats:
         """Optical depth (n,) of all that is between the light and points (n, 3), moved so many meters toward it."""

@@ -183,20 +183,20 @@ def drawn_blocks(given: Drawing) -> Iterator[int | Block | Parts | Shown]:
     items, outside, shown = _tiles(given)
     given, beyond = replace(given, parts=()), given.tiles or tiles_of(given.camera)
     yield from shown
-    for kind, own in enumerate(outside):
-        for run in blocks(len(own), _OUTSIDE_BATCH):
-            some = [other.take(slice(0)) for other in outside]
-            some[kind] = own.take(run)
-            items.append((beyond, None, some, len(some[kind]) / sum(map(len, outside))))
+    for kind, rows in enumerate(outside):
+        for run in blocks(len(rows), _OUTSIDE_BATCH):
+            parts = [other.take(slice(0)) for other in outside]
+            parts[kind] = rows.take(run)
+            items.append((beyond, None, parts, len(parts[kind]) / sum(map(len, outside))))
     del outside
     numbers, before = [number for number, *_ in items], None
     # What was sent is let go: the parts of all tiles are a fifth of what is there before anything is made of them.
     given_away = (items.pop(0) for _ in range(len(items)))
-    for place, made in enumerate(in_processes(_drawn_tile, given, given_away)):
+    for place, drawn in enumerate(in_processes(_drawn_tile, given, given_away)):
         if numbers[place] != before:
             yield (before := numbers[place])
-        while made:
-            one = made.pop(0)
+        while drawn:
+            one = drawn.pop(0)
             yield replace(one, fraction=(place + 1) / len(numbers)) if isinstance(one, Block) else one
 
 
@@ -215,10 +215,10 @@ def _tiles(given: Drawing) -> tuple[list[_Item], list[Arrays], list[Shown]]:
     ends = np.linspace(0, whole.width, number + 1).astype(np.int64)
     frontier = Frontier(given.kinds, whole, given.facet)
     inside, outside = [], []
-    for kind, some in zip(given.kinds, given.parts, strict=True):
-        found, beyond = [[some.take(slice(0))] for _ in range(number)], [some.take(slice(0))]
-        while len(some):
-            pool = frontier.pool(kind, some)
+    for kind, parts in zip(given.kinds, given.parts, strict=True):
+        by_tile, beyond = [[parts.take(slice(0))] for _ in range(number)], [parts.take(slice(0))]
+        while len(parts):
+            pool = frontier.pool(kind, parts)
             prints = whole.of_spheres(pool.center, pool.radius)
             out = whole.outside(prints)
             low, high = np.clip(prints.low[:, 0], 0, whole.width), np.clip(prints.high[:, 0], 0, whole.width)
@@ -226,21 +226,21 @@ def _tiles(given: Drawing) -> tuple[list[_Item], list[Arrays], list[Shown]]:
             if given.smaller < 1.0:
                 left, right = np.searchsorted(ends[1:-1], [low, high])
                 wide |= (left < right) & (high - low > AT_BORDER)
-            wide &= ~out & kind.can_open(some)
-            beyond.append(some.take(np.flatnonzero(out)))
+            wide &= ~out & kind.can_open(parts)
+            beyond.append(parts.take(np.flatnonzero(out)))
             stay = np.flatnonzero(~out & ~wide)
             middle = np.clip(whole.project(pool.center[stay])[0], 0, whole.width - 1)
             column = np.clip(np.searchsorted(ends, middle, side="right") - 1, 0, number - 1)
-            for tile, own in enumerate(found):
-                own.append(some.take(stay[column == tile]))
-            some = kind.opened(kind.met(some.take(np.flatnonzero(wide)), frontier.shown))[0]
-        inside.append([kind.ordered(type(some).concatenate(found.pop(0))) for _ in range(number)])
-        outside.append(kind.ordered(type(some).concatenate(beyond)))
+            for tile, contents in enumerate(by_tile):
+                contents.append(parts.take(stay[column == tile]))
+            parts = kind.opened(kind.met(parts.take(np.flatnonzero(wide)), frontier.shown))[0]
+        inside.append([kind.ordered(type(parts).concatenate(by_tile.pop(0))) for _ in range(number)])
+        outside.append(kind.ordered(type(parts).concatenate(beyond)))
     covered, tiles = given.covered + _LEAST_SHARE * max(given.covered.mean(), 1.0), []
     for tile, (first, end) in enumerate(itertools.pairwise(ends.tolist())):
-        own = [of[tile] for of in inside]
-        if any(map(len, own)):
-            tiles.append((tile, (first, end), own, float(covered[first:end].sum() / covered.sum())))
+        contents = [of[tile] for of in inside]
+        if any(map(len, contents)):
+            tiles.append((tile, (first, end), contents, float(covered[first:end].sum() / covered.sum())))
     if given.tiles:
         tiles.sort(key=lambda item: min(p.near.min(initial=np.inf) for p in map(frontier.pool, given.kinds, item[2])))
     return tiles, outside, frontier.shown
@@ -287,9 +287,9 @@ class _Tile(Canvas):
         owners = sorted({one for one, _ in self._facets}, key=lambda one: (one[0] is None, one[0] or 0, one[1]))
         facets = []
         for whose in owners:
-            there = [seen for seen in (True, False) if (whose, seen) in self._facets]
-            own = tuple((joined(self._facets.pop((whose, seen))), seen) for seen in there)
-            facets.append(Parts(whose[0], own, whose[1], self.coarser))
+            states = [seen for seen in (True, False) if (whose, seen) in self._facets]
+            parts = tuple((joined(self._facets.pop((whose, seen))), seen) for seen in states)
+            facets.append(Parts(whose[0], parts, whose[1], self.coarser))
         return [*blocks, *facets, *self.frontier.shown]
 
     @property
@@ -359,17 +359,17 @@ class _Tile(Canvas):
             pixels = faces.side / self.given.camera.extent_around(faces.center)
             return 1.0 + pixels / (1.0 + pixels)
 
-        there: dict[Any, Any] = {what: joined(own) for what, own in self._facets.items()}
-        there |= {what: concatenate_buffers(own) for what, own in self.meshes.items()}
-        ranks = [rank(what, one) for what, one in there.items()]
+        shapes: dict[Any, Any] = {what: joined(group) for what, group in self._facets.items()}
+        shapes |= {what: concatenate_buffers(group) for what, group in self.meshes.items()}
+        ranks = [rank(what, one) for what, one in shapes.items()]
         kept = np.ones(sum(map(len, ranks)), bool)
         kept[np.argsort(np.concatenate(ranks), kind="stable")[: int(np.ceil(number))]] = False
         self._facets.clear()
-        for (what, one), own in zip(there.items(), np.split(kept, np.cumsum([*map(len, ranks)])[:-1]), strict=True):
+        for (what, one), stay in zip(shapes.items(), np.split(kept, np.cumsum([*map(len, ranks)])[:-1]), strict=True):
             if isinstance(one, MeshBuffers):
-                self.meshes[what] = [kept_faces(one, own)]
-            elif own.any():
-                self._facets[what] = [one.take(np.flatnonzero(own))]
+                self.meshes[what] = [kept_faces(one, stay)]
+            elif stay.any():
+                self._facets[what] = [one.take(np.flatnonzero(stay))]
 
     # -- what is seen ---------------------------------------------------------------------------------------------
 
@@ -381,24 +381,24 @@ class _Tile(Canvas):
             for polygons in drawn:
                 self.fill(*polygons)
         lost: dict[Whose, list[tuple[Facets, Floats]]] = {}
-        for (what, made, corners), (prints, gone, _) in zip(waiting, tested, strict=True):
+        for (what, shape, corners), (prints, gone, _) in zip(waiting, tested, strict=True):
             seen = np.flatnonzero(~gone)
             gone[seen] = self.coverage.hidden(prints.take(seen))
-            some = np.flatnonzero(gone)
-            number = uniform(place_keys(corners[some, 0]), _MERGE)
+            hidden = np.flatnonzero(gone)
+            number = uniform(place_keys(corners[hidden, 0]), _MERGE)
             likely = np.flatnonzero(number < max(0.5, self._left))
-            some, number = some[likely], number[likely]
-            if isinstance(made, Facets):
-                self._keep(made.take(np.flatnonzero(~gone)), True, what)
-                lost.setdefault(what, []).append((made.take(some), number))
+            hidden, number = hidden[likely], number[likely]
+            if isinstance(shape, Facets):
+                self._keep(shape.take(np.flatnonzero(~gone)), True, what)
+                lost.setdefault(what, []).append((shape.take(hidden), number))
                 continue
-            if len(some):
-                facets = _facets_of_faces(corners[some], np.diff(made.face_offsets)[some], made, some)
+            if len(hidden):
+                facets = _facets_of_faces(corners[hidden], np.diff(shape.face_offsets)[hidden], shape, hidden)
                 lost.setdefault((what[2], ""), []).append((facets, number))
-            made = kept_faces(made, ~gone) if gone.any() else made
-            if made.polygons:
-                self.number += made.polygons
-                self.meshes.setdefault(what, []).append(made)
+            shape = kept_faces(shape, ~gone) if gone.any() else shape
+            if shape.polygons:
+                self.number += shape.polygons
+                self.meshes.setdefault(what, []).append(shape)
         for whose, every in lost.items():
             self._merge(joined([facets for facets, _ in every]), np.concatenate([n for _, n in every]), whose)
 
@@ -423,8 +423,8 @@ class _Tile(Canvas):
             times[left] = more
         cell, area = 2 * self.coverage.cells(column[0], row[0]) + (facets.transmission > 0.0), facets.side**2
         large, alike = (np.where(of, area, 0.0) for of in (times > 1.0, times == 1.0))
-        lost, borne, most, own = (np.bincount(cell, of) for of in (area, large, large * times, alike))
-        rest = np.maximum(lost - min(max(0.5, self._left), 1.0) * most, 0.0) / np.maximum(own, 1e-300)
+        lost, borne, most, single = (np.bincount(cell, of) for of in (area, large, large * times, alike))
+        rest = np.maximum(lost - min(max(0.5, self._left), 1.0) * most, 0.0) / np.maximum(single, 1e-300)
         likely = (lost / np.maximum(borne, 1e-300))[cell] / np.maximum(times, 1.0)
         likely = np.where(times > 1.0, likely, np.minimum(rest[cell], self._left) * times)
         kept = np.flatnonzero(number < likely)
@@ -454,7 +454,7 @@ class _Tile(Canvas):
             hidden = self._hidden(facets)
             self._keep(facets.take(np.flatnonzero(hidden)), False, whose)
             large = facets.side > self.given.facet * self.given.camera.extent_around(facets.center)
-            lit, rest = (np.flatnonzero(~hidden & large & own) for own in (~dark, dark))
+            lit, rest = (np.flatnonzero(~hidden & large & zone) for zone in (~dark, dark))
             smaller = facets.take(rest)
             facets = Facets.concatenate([quarters(facets.take(lit)), replace(smaller, side=0.5 * smaller.side)])
             dark = np.repeat([False, True], [4 * len(lit), len(rest)])
@@ -514,17 +514,17 @@ class _Tile(Canvas):
         times = max(np.sqrt(number / max(most, 1.0)), 1.0)
         numbers = [area / np.minimum(times * side, largest) ** 2 for *_, side, _, area in drawn]
         large = [(times * side > largest) & (not kind.stays) for kind, _, side, _, _ in drawn]
-        of_large = sum(float(own[of].sum()) for own, of in zip(numbers, large, strict=True))
-        room = max(most - sum(float(own.sum()) for own in numbers) + of_large, _LEAST_OUTSIDE * most)
-        for (kind, pool, side, kept, _), own, of in zip(drawn, numbers, large, strict=True):
+        of_large = sum(float(count[of].sum()) for count, of in zip(numbers, large, strict=True))
+        room = max(most - sum(float(count.sum()) for count in numbers) + of_large, _LEAST_OUTSIDE * most)
+        for (kind, pool, side, kept, _), count, of in zip(drawn, numbers, large, strict=True):
             stay = ~of | (uniform(place_keys(pool.center), _DROPPED) * of_large < room)
             # Most parts have a small part of a facet each: so many fewer of them have so much more, which is as much.
-            scarce = stay & (own > 0.0) & (own < 0.5 / leaves) & (not kind.stays)
+            scarce = stay & (count > 0.0) & (count < 0.5 / leaves) & (not kind.stays)
             chosen = scarce & (uniform(place_keys(pool.center), _SCARCE) < 1.0 / leaves)
-            for more, some in ((1.0, np.flatnonzero(stay & ~scarce)), (np.sqrt(leaves), np.flatnonzero(chosen))):
-                size = np.minimum(times * side[some], largest) / more
-                given = pool.parts.take(some), size, kept[some], self.frontier.shown
-                for whose, facets in kind.unseen(*given) if len(some) else ():
+            for more, index in ((1.0, np.flatnonzero(stay & ~scarce)), (np.sqrt(leaves), np.flatnonzero(chosen))):
+                size = np.minimum(times * side[index], largest) / more
+                given = pool.parts.take(index), size, kept[index], self.frontier.shown
+                for whose, facets in kind.unseen(*given) if len(index) else ():
                     facets = replace(facets, side=more * facets.side)
                     if outside:
                         self._keep(pushed_outside_view(facets, self.coverage.camera.distance_to_view), False, whose)

@@ -53,12 +53,12 @@ class EmissionInput:
         if self.drawing is None:
             return None
         number, area = map(sum, zip((0, 0.0), *self._seen, strict=True))
-        own = self.drawing.camera.pixel_size / self.camera.pixel_size
-        return own * self.drawing.facet * float(np.sqrt(area / number if number else 1.0))
+        scale = self.drawing.camera.pixel_size / self.camera.pixel_size
+        return scale * self.drawing.facet * float(np.sqrt(area / number if number else 1.0))
 
     def mesh_blocks(self) -> Iterator[Block]:
         """Meshes of plants. Facets and what of other things is drawn as it is can be asked for after that."""
-        return (made for made in self.tiles(None) if isinstance(made, Block))
+        return (block for block in self.tiles(None) if isinstance(block, Block))
 
     def tiles(self, proxies: Callable[[Self], Iterator[Buffers]] | None) -> Iterator[int | Block | Buffers]:
         """The same with the number of each tile before its meshes, and what becomes of its facets after them."""
@@ -69,16 +69,16 @@ class EmissionInput:
         self._shown.clear()
         self._seen.clear()
         tile = -1
-        for made in drawn_blocks(self.drawing):
-            if isinstance(made, Parts):
-                self._waiting.append(made)
-                self._seen.extend((len(facets), made.coarser**2 * len(facets)) for facets, seen in made if seen)
+        for drawn in drawn_blocks(self.drawing):
+            if isinstance(drawn, Parts):
+                self._waiting.append(drawn)
+                self._seen.extend((len(facets), drawn.coarser**2 * len(facets)) for facets, seen in drawn if seen)
                 yield from () if proxies is None else proxies(self)
-            elif isinstance(made, tuple):
-                self._shown.append((tile, made))
+            elif isinstance(drawn, tuple):
+                self._shown.append((tile, drawn))
             else:
-                tile = made if isinstance(made, int) else tile
-                yield made
+                tile = drawn if isinstance(drawn, int) else tile
+                yield drawn
         self._shown.sort(key=lambda one: one[0])
 
     def polygon_blocks(self) -> Iterator[PolygonBlock]:
@@ -150,9 +150,9 @@ def facet_blocks(refined: EmissionInput) -> Iterator[Buffers]:
     """Facets as the form of the drawing has made them: triangles, spheres, or triangles where they are seen."""
     for parts in refined.facet_parts():
         for round_ in (False, True):
-            own = [some for some, _ in parts if (some.radius is not None) == round_]
-            if own:
-                yield replace(shape_buffers(joined(own)), species=parts.species, look=parts.look)
+            shapes = [group for group, _ in parts if (group.radius is not None) == round_]
+            if shapes:
+                yield replace(shape_buffers(joined(shapes)), species=parts.species, look=parts.look)
 
 
 def shell_blocks(refined: EmissionInput, light: BakedLight | None = None, _first: int = 0) -> Iterator[MeshBuffers]:
@@ -167,16 +167,16 @@ def baked_facet_blocks(given: EmissionInput, light: BakedLight, first: int, roun
     sun = sun_of(given.refinement.lights)
     form = FacetForm(given.camera, given.disc, sun, (True, False) if round_ else ())
     for parts in given.facet_parts():
-        facets = joined([some for some, _ in parts])
+        facets = joined([group for group, _ in parts])
         sheets = np.arange(first, first + len(facets))
         first += len(facets)
-        made = shape_buffers(joined([form(some, seen) for some, seen in parts]))
+        buffers = shape_buffers(joined([form(group, seen) for group, seen in parts]))
         if round_:
             baked = baked_attributes('POINT', light.of_spheres(facets, sheets))
             values = {name: array for name, (_, array) in baked.items()}
         else:
             values = baked_attributes('FACE', *light.of_facets(facets, sheets))
-        yield replace(made, attributes={**made.attributes, **values}, species=parts.species, look=parts.look)
+        yield replace(buffers, attributes={**buffers.attributes, **values}, species=parts.species, look=parts.look)
 
 
 MICROSURFACES = ProxyEmitter(facet_blocks, partial(FacetForm, spheres=()), baked_facet_blocks)

@@ -82,8 +82,8 @@ class _Pool:
     def take(self, index: Integers) -> Waiting:
         """Some (k,) of them, in that order: depths of their cells come in it, too."""
         runs = np.searchsorted(np.cumsum([len(rows) for _, rows in self._runs]), index, side="right")
-        found = Waiting.concatenate([run.take(rows) for run, rows in self._within(index)])
-        return found.take(np.argsort(np.argsort(runs, kind="stable"))) if len(self._runs) > 1 else found
+        waiting = Waiting.concatenate([run.take(rows) for run, rows in self._within(index)])
+        return waiting.take(np.argsort(np.argsort(runs, kind="stable"))) if len(self._runs) > 1 else waiting
 
     def keep(self, index: Integers, later: Sequence[Waiting]) -> int:
         """Only some (k,) wait still, and others do from now on; how many there were."""
@@ -262,7 +262,7 @@ class Frontier:
 
         In each cell of the image these are the nearest ones, which have no more than about so many facets in all.
         """
-        pools = [_Pool(self.pool(kind, own)) for kind, own in zip(self.kinds, parts, strict=True)]
+        pools = [_Pool(self.pool(kind, rows)) for kind, rows in zip(self.kinds, parts, strict=True)]
         cells = len(np.unique(np.concatenate([pool.column("cell") for pool in pools])))
         dense = min(SLAB * CELL**2, FIRST * most / max(cells, 1))
         for pool, *left in zip(pools, self.hidden, self.outside, strict=True):
@@ -273,11 +273,11 @@ class Frontier:
             ready, first = [], 0
             for number, pool in enumerate(pools):
                 # In their order, so that the next sorting finds most of it done.
-                own = order[(order >= first) & (order < first + len(pool))]
-                begun = (near <= depth)[own]
-                made, later = self._decided(number, pool.take(own[begun] - first), depth[own[begun]])
-                first += pool.keep(own[~begun] - first, later)
-                ready.append(made)
+                rows = order[(order >= first) & (order < first + len(pool))]
+                begun = (near <= depth)[rows]
+                slab, later = self._decided(number, pool.take(rows[begun] - first), depth[rows[begun]])
+                first += pool.keep(rows[~begun] - first, later)
+                ready.append(slab)
             # Where much was hidden, or little is left, the next ones are so many more.
             wanted = min(max(SLAB * CELL**2 * cells, LEAST), max(most, 1.0))
             number = float(sum(one.count.sum() for one in ready))
@@ -325,9 +325,9 @@ class Frontier:
             large = ((pixels > DETAIL) & (slab.count > FEW)) | kind.to_be_opened(slab.parts)
             large &= kind.can_open(slab.parts)
             ready.append(slab.take(~large))
-            some = np.flatnonzero(large)
-            parts, owner = kind.opened(slab.parts.take(some))
-            new, depth = self.pool(kind, parts), depth[some][owner]
+            parents = np.flatnonzero(large)
+            parts, owner = kind.opened(slab.parts.take(parents))
+            new, depth = self.pool(kind, parts), depth[parents][owner]
             soon = new.near <= depth
             later.append(new.take(new.near > depth))
             slab, depth = new.take(soon), depth[soon]

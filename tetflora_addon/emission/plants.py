@@ -80,8 +80,8 @@ class LeafDetail:
         """
         branches, camera = whole.branches, self.camera
         out = np.zeros(len(branches))
-        forms = ([f for kind in range(len(LEAF_KINDS)) for f in own[kind]] for own in self.flora.forms)
-        errors = np.array([max((coarse_error(f) for f in own), default=0.0) for own in forms])
+        forms = ([f for kind in range(len(LEAF_KINDS)) for f in models[kind]] for models in self.flora.forms)
+        errors = np.array([max((coarse_error(f) for f in models), default=0.0) for models in forms])
         most = 1.0 / np.maximum(errors[self.flora.rows["species"][branches.row]], 1e-300)
         size = self.flora.rows["leaf_size"][branches.row].sum(axis=1) * branches.scale
         for factor in ("leaf_size_tip", "leaf_size_young"):
@@ -214,13 +214,13 @@ def explicit_blocks(flora: Flora, result: Refinement, camera: Camera, tolerance:
     Parts that lie in explicit tetrahedra in part are opened; margins of near leaves may be off by a tolerance, pixels.
     """
     plants, runs = result.plants, []
-    parts, inside = inside_explicit(plants, result, lambda own, inside: (inside < 1.0) & (plants.pixels(own) > MIXED))
+    parts, inside = inside_explicit(plants, result, lambda rows, inside: (inside < 1.0) & (plants.pixels(rows) > MIXED))
     for alone in (False, True):
-        some = parts.branches.take(np.flatnonzero((inside >= 0.5) & (parts.branch_only == alone)))
+        branches = parts.branches.take(np.flatnonzero((inside >= 0.5) & (parts.branch_only == alone)))
         # Front to back, ties by the plants themselves, so that their order in the scene does not matter.
-        some = some.take(np.lexsort([some.key, np.linalg.norm(some.position - camera.eye, axis=1)]))
-        polygons = piece_totals(flora, as_pieces(some)).polygons if alone else flora.face_counts(some)
-        runs += [(alone, some.take(run)) for run in chunks(polygons, BLOCK_POLYGONS)]
+        branches = branches.take(np.lexsort([branches.key, np.linalg.norm(branches.position - camera.eye, axis=1)]))
+        polygons = piece_totals(flora, as_pieces(branches)).polygons if alone else flora.face_counts(branches)
+        runs += [(alone, branches.take(run)) for run in chunks(polygons, BLOCK_POLYGONS)]
     yield from _made(flora, LeafDetail(flora, camera, tolerance), runs, len(runs) > 1)
 
 
@@ -237,25 +237,25 @@ def _made(flora: Flora, detail: LeafDetail | None, runs: list[tuple[bool, Branch
     """The meshes of runs of branches, which are alone or with all that grows on them."""
     number = len(runs)
     items = ((n, (n + 1) / number, *runs.pop(0)) for n in range(number))
-    for made in in_processes(_expanded, (flora, detail), items, worth):
-        while made:
-            yield made.pop(0)
+    for blocks in in_processes(_expanded, (flora, detail), items, worth):
+        while blocks:
+            yield blocks.pop(0)
 
 
 def _expanded(given: tuple[Flora, LeafDetail | None], run: tuple[int, float, bool, Branches]) -> list[Block]:
     """The meshes of one run of whole sub-plants, or of branches alone."""
     (flora, detail), (number, fraction, alone, plants) = given, run
     whole = [WholeBranches(plants, axes(flora.rows, plants))] if alone else list(expand(flora, plants))
-    species = [flora.species_of(some.branches.row) for some in whole]
-    made: list[Block] = []
+    species = [flora.species_of(group.branches.row) for group in whole]
+    blocks: list[Block] = []
     for s in np.unique(np.concatenate([np.zeros(0, int), *species])).tolist():
-        own = [some.take(np.flatnonzero(kind == s)) for some, kind in zip(whole, species, strict=True)]
-        for leaves in leaf_meshes(flora, s, own, None, None if detail is None else detail.lengths):
-            made.append(Block(LEAF_KINDS[leaves.kind], leaves.form, s, number, leaves.buffers, fraction))
-        bark = tube_buffers(flora, own, None if detail is None else detail.wood)
+        branches = [group.take(np.flatnonzero(kind == s)) for group, kind in zip(whole, species, strict=True)]
+        for leaves in leaf_meshes(flora, s, branches, None, None if detail is None else detail.lengths):
+            blocks.append(Block(LEAF_KINDS[leaves.kind], leaves.form, s, number, leaves.buffers, fraction))
+        bark = tube_buffers(flora, branches, None if detail is None else detail.wood)
         if bark is not None:
-            made.append(Block("bark", 0, s, number, bark, fraction))
-    return made
+            blocks.append(Block("bark", 0, s, number, bark, fraction))
+    return blocks
 
 
 #: Pixels from which on a branch that nothing else grows on has a line of its own; smaller ones are as straight.
@@ -346,9 +346,9 @@ class GrownPlants(FrontierKind):
 
     def opened(self, parts: PlantRows) -> tuple[PlantRows, Integers]:
         """As of `FrontierKind`."""
-        made = [(PlantRows.of(self.flora, new, lines), of) for new, of, lines in opened(self.flora, parts)]
-        owner = np.concatenate([np.zeros(0, np.int64), *(of for _, of in made)])
-        return PlantRows.concatenate([new for new, _ in made]), owner
+        children = [(PlantRows.of(self.flora, new, lines), of) for new, of, lines in opened(self.flora, parts)]
+        owner = np.concatenate([np.zeros(0, np.int64), *(of for _, of in children)])
+        return PlantRows.concatenate([new for new, _ in children]), owner
 
     def to_be_opened(self, parts: PlantParts) -> Mask:
         """Those of which leaves are real."""
@@ -361,24 +361,24 @@ class GrownPlants(FrontierKind):
         lines = parts.branch_only | ~parts.can_open(self.flora)
         lines &= parts.branch_only | (2.0 * slab.radius > LINES * extent) | (self.transition.of_branches(branches) > 0)
         for s, every in self._by_species(branches):
-            some = every[~lines[every]]
-            if len(some):
-                own = branches.take(some)
-                rules = self._rules(own, side[some], False, thin=canvas.thin)
-                canvas.add_facets((s, ""), subplant_facets(self.flora, own, rules))
+            index = every[~lines[every]]
+            if len(index):
+                subplants = branches.take(index)
+                rules = self._rules(subplants, side[index], False, thin=canvas.thin)
+                canvas.add_facets((s, ""), subplant_facets(self.flora, subplants, rules))
         self._draw_branches(canvas, branches.take(np.flatnonzero(lines)), side[lines])
 
     def unseen(self, parts: PlantParts, side: Floats, kept: Floats, _shown: list[Shown]) -> Iterator[Owned]:
         """As of `FrontierKind`."""
         for s, every in self._by_species(parts.branches):
             for alone in (False, True):
-                some = every[parts.branch_only[every] == alone]
-                own = parts.branches.take(some)
-                if len(own) and alone:
-                    yield (s, ""), piece_facets(self.flora, as_pieces(own), self._rules(own, side[some], alone))
-                elif len(own):
-                    rules = self._rules(own, side[some], alone, 1.0 - kept[some])
-                    yield (s, ""), subplant_facets(self.flora, own, rules)
+                index = every[parts.branch_only[every] == alone]
+                plants = parts.branches.take(index)
+                if len(plants) and alone:
+                    yield (s, ""), piece_facets(self.flora, as_pieces(plants), self._rules(plants, side[index], alone))
+                elif len(plants):
+                    rules = self._rules(plants, side[index], alone, 1.0 - kept[index])
+                    yield (s, ""), subplant_facets(self.flora, plants, rules)
 
     def _by_species(self, branches: Branches) -> Iterator[tuple[int, Integers]]:
         """Each species that there is, and its branches (k,)."""
@@ -414,32 +414,32 @@ class GrownPlants(FrontierKind):
         tubes = uniform(branches.key, Draw.TRANSITION) < explicit_fraction(wide, TUBES)
         thin, detail = wide < BROAD, transition.detail
         for s, every in self._by_species(branches):
-            own = np.zeros(len(branches), bool)
-            own[every] = True
-            left = np.flatnonzero(own[owner] & (explicit[owner] < 1.0))
+            kin = np.zeros(len(branches), bool)
+            kin[every] = True
+            left = np.flatnonzero(kin[owner] & (explicit[owner] < 1.0))
             if len(left):
                 of = owner[left]
                 canvas.add_facets((s, ""), piece_facets(flora, pieces.take(left), rules.take(of), (whole, of)))
-            some = whole.take(np.flatnonzero(own & (explicit > 0.0)))
+            bearers = whole.take(np.flatnonzero(kin & (explicit > 0.0)))
             given = lambda b: (explicit[b.plant], *transition.of_kites(b)), detail.lengths, canvas.thin
-            for one in leaf_meshes(flora, s, [some], *given) if len(some) else ():
+            for one in leaf_meshes(flora, s, [bearers], *given) if len(bearers) else ():
                 canvas.add_mesh((LEAF_KINDS[one.kind], one.form, s), one.buffers, True)
             # What is a few pixels wide has few sides; of wider wood all is drawn, or its shading would end at holes.
-            slender, broad = (whole.take(np.flatnonzero(own & tubes & (thin == is_thin))) for is_thin in (True, False))
+            slender, broad = (whole.take(np.flatnonzero(kin & tubes & (thin == is_thin))) for is_thin in (True, False))
             canvas.add_mesh(("bark", 0, s), tube_buffers(flora, [slender], None, SIDES), True)
             canvas.add_mesh(("bark", 0, s), tube_buffers(flora, [broad], detail.wood))
-            self._draw_twigs(canvas, s, whole.take(np.flatnonzero(own & ~tubes)), side, extent)
+            self._draw_twigs(canvas, s, whole.take(np.flatnonzero(kin & ~tubes)), side, extent)
 
     def _draw_twigs(self, canvas: Canvas, species: int, whole: WholeBranches, side: Floats, extent: Floats) -> None:
         """One thin triangle or ribbon each, or of very thin ones wider ones of fewer."""
         branches = whole.branches
         few = TWIG * side[branches.plant] ** 2
         likely = np.clip(np.pi * branches.radius * branches.length / few, 0.02, 1.0)
-        some = np.flatnonzero(uniform(branches.key, _THIN) < likely)
-        if not len(some):
+        twigs = np.flatnonzero(uniform(branches.key, _THIN) < likely)
+        if not len(twigs):
             return
-        whole = whole.take(some)
+        whole = whole.take(twigs)
         # The parts of a bow are off their chords by the square of their share of it.
-        off = whole.lines.bend() / (BENT * extent[branches.plant[some]])
+        off = whole.lines.bend() / (BENT * extent[branches.plant[twigs]])
         parts = np.clip(np.ceil(np.sqrt(off)).astype(np.int64), 1, whole.lines.segments)
-        canvas.add_mesh(("bark", 0, species), twig_buffers(self.flora, whole, 1.0 / likely[some], parts), True)
+        canvas.add_mesh(("bark", 0, species), twig_buffers(self.flora, whole, 1.0 / likely[twigs], parts), True)

@@ -89,9 +89,9 @@ class Faces(FrontierKind):
         """As of `FrontierKind`."""
         rows = slab.parts
         kept = _stays(rows, side) | self._wide(rows)
-        own = rows.take(np.flatnonzero(kept))
-        shown.append(("face", own))
-        canvas.add_shown(self.triangles(own), len(own))
+        faces = rows.take(np.flatnonzero(kept))
+        shown.append(("face", faces))
+        canvas.add_shown(self.triangles(faces), len(faces))
         rest = np.flatnonzero(~kept)
         for whose, facets in self._facets(rows.take(rest), side[rest]):
             canvas.add_facets(whose, facets)
@@ -107,18 +107,18 @@ class Faces(FrontierKind):
         looks = np.array(self.looks)[self.meshes.surface[rows.instance]]
         polygons = rows.whole(self.meshes)
         for look in np.unique(looks).tolist():
-            own = np.flatnonzero(looks == look)
-            for run in chunks(rows.optical[own] / side[own] ** 2 + 1, _BATCH):
-                some = own[run]
-                yield (None, look), chosen_facets(polygons.take(some), rows.optical[some], side[some])
+            alike = np.flatnonzero(looks == look)
+            for run in chunks(rows.optical[alike] / side[alike] ** 2 + 1, _BATCH):
+                faces = alike[run]
+                yield (None, look), chosen_facets(polygons.take(faces), rows.optical[faces], side[faces])
 
     def triangles(self, rows: FaceRows, least: float = 0.0) -> Floats:
         """Corners (t, 3, 3) of the triangles of opaque faces that are so many pixels wide at least, meters."""
         meshes = self.meshes
         wide = 2.0 * rows.reach >= least * self.camera.extent_around(rows.center)
-        some = rows.take(np.flatnonzero(wide & (meshes.coverage[meshes.slot[rows.face]] >= OPAQUE)))
-        owner, index = spread(meshes.face_size[some.face] - 2)
-        return meshes.corners(meshes.face_triangle[some.face][owner] + index, some.instance[owner])
+        faces = rows.take(np.flatnonzero(wide & (meshes.coverage[meshes.slot[rows.face]] >= OPAQUE)))
+        owner, index = spread(meshes.face_size[faces.face] - 2)
+        return meshes.corners(meshes.face_triangle[faces.face][owner] + index, faces.instance[owner])
 
 
 def _stays(rows: FaceRows, side: Floats) -> Mask:
@@ -134,9 +134,9 @@ def chosen_facets(polygons: Polygons, optical: Floats, side: Floats) -> Facets:
     meshes = polygons.meshes
     owner, triangle, _ = polygons.triangles()
     vector, key = meshes.vectors(triangle, polygons.instance[owner]), key_of_seed(polygons.instance)[owner]
-    own = np.linalg.norm(vector, axis=1)
-    rate = optical / (np.maximum(np.bincount(owner, own, len(polygons)), 1e-300) * np.maximum(side, 1e-12) ** 2)
-    pick, number = spread(np.floor(own * rate[owner] + stepped(key, triangle)).astype(np.int64))
+    area = np.linalg.norm(vector, axis=1)
+    rate = optical / (np.maximum(np.bincount(owner, area, len(polygons)), 1e-300) * np.maximum(side, 1e-12) ** 2)
+    pick, number = spread(np.floor(area * rate[owner] + stepped(key, triangle)).astype(np.int64))
 
     thing, triangle = owner[pick], triangle[pick]
     key = child_key(mix(key_of_seed(triangle) ^ key[pick]), number)  # several facets of a triangle lie apart
@@ -177,10 +177,10 @@ def polygon_blocks(polygons: Polygons) -> Iterator[PolygonBlock]:
     """Polygons as meshes, some at a time."""
     runs = list(chunks(np.maximum(polygons.triangle_counts / 2, 1), BLOCK_POLYGONS))  # of quads; others by corners
     for number, run in enumerate(runs):
-        own = polygons.take(run)
-        surface = own.meshes.surface[own.instance]
+        faces = polygons.take(run)
+        surface = faces.meshes.surface[faces.instance]
         for s in np.unique(surface):
-            yield PolygonBlock(int(s), number, polygon_buffers(own.take(surface == s)), (number + 1) / len(runs))
+            yield PolygonBlock(int(s), number, polygon_buffers(faces.take(surface == s)), (number + 1) / len(runs))
 
 
 def polygon_buffers(polygons: Polygons) -> MeshBuffers:
@@ -199,10 +199,10 @@ def polygon_buffers(polygons: Polygons) -> MeshBuffers:
     place = np.where(own_place, count + corner, meshes.corner_verts[corner])
     places = count + len(meshes.corner_verts)
     vertices, shared = np.unique(instance.astype(np.int64) * places + place, return_inverse=True)
-    own, vertex = np.divmod(vertices, max(places, 1))
+    owner, vertex = np.divmod(vertices, max(places, 1))
     loose = vertex >= count
     vertex[loose] = meshes.corner_verts[vertex[loose] - count]
-    points = meshes.to_world(meshes.positions[vertex][:, None], own)[:, 0]
+    points = meshes.to_world(meshes.positions[vertex][:, None], owner)[:, 0]
     offsets = np.cumsum([0, *size])
 
     turn = np.where(meshes.mirrored[pieces.instance][:, None], [[0, 2, 1]], [[0, 1, 2]])

@@ -58,7 +58,7 @@ def _shell_buffers(cells: MediumCells, rank: NDArray | None = None, light: Float
     }
     if light is not None:
         of_cells |= {f"tf_light{k}": light[order, k] for k in range(4)}
-    faces = {name: ("FACE", np.repeat(own.astype(np.float32), 4, axis=0)) for name, own in of_cells.items()}
+    faces = {name: ("FACE", np.repeat(values.astype(np.float32), 4, axis=0)) for name, values in of_cells.items()}
     first = np.arange(len(cells), dtype=np.int32)[:, None, None]
     return MeshBuffers(
         positions=cells.vertices.reshape(-1, 3).astype(np.float32),

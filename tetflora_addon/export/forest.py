@@ -117,15 +117,15 @@ class Forest:
 
 def identifiers(names: Sequence[str]) -> list[str]:
     """Names of letters from a to z, digits and underscores that all formats take, all different."""
-    found: list[str] = []
+    unique: list[str] = []
     for name in names:
         plain = re.sub(r"[^A-Za-z0-9_]+", "_", name).strip("_")[:60] or "plant"
         plain = f"_{plain}" if plain[0].isdigit() else plain
         number = 1
-        while (other := plain if number == 1 else f"{plain}_{number}") in found:
+        while (other := plain if number == 1 else f"{plain}_{number}") in unique:
             number += 1
-        found.append(other)
-    return found
+        unique.append(other)
+    return unique
 
 
 @contextmanager

@@ -60,15 +60,15 @@ class _Document:
         values = np.ascontiguousarray(values)
         kind = {np.dtype(np.float32): _FLOAT, np.dtype(np.uint32): _INT, np.dtype(np.uint8): _BYTE}[values.dtype]
         more: dict[str, Any] = {} if target is None else {"target": target}
-        found = {
+        accessor = {
             "bufferView": self.data(values.tobytes(), **more),
             "componentType": kind,
             "count": len(values),
             "type": _TYPES[1 if values.ndim == 1 else values.shape[1]],
         }
         if bounds:
-            found |= {"min": values.min(axis=0).tolist(), "max": values.max(axis=0).tolist()}
-        return self.add("accessors", found)
+            accessor |= {"min": values.min(axis=0).tolist(), "max": values.max(axis=0).tolist()}
+        return self.add("accessors", accessor)
 
 
 def write_gltf(path: Path, forest: Forest) -> Iterator[float]:
@@ -124,12 +124,12 @@ def _add_material(document: _Document, folder: Path, surface: BakedSurface) -> i
     if "roughness" in textures:  # its blue would be the metallic part, which the factor makes 0
         metallic |= {"roughnessFactor": 1.0, "metallicRoughnessTexture": textures["roughness"]}
     # Twigs of coarse levels are sheets, as leaves are.
-    made = {"name": surface.name, "pbrMetallicRoughness": metallic, "doubleSided": True}
+    material = {"name": surface.name, "pbrMetallicRoughness": metallic, "doubleSided": True}
     index = {"KHR_materials_ior": {"ior": surface.index}}
-    made |= {"extensions": index, "extras": {"transmission": surface.transmission}}
-    made |= {"normalTexture": textures["normal"]} if "normal" in textures else {}
-    made |= {"alphaMode": "MASK", "alphaCutoff": surface.cut} if surface.cut else {}
-    return document.add("materials", made)
+    material |= {"extensions": index, "extras": {"transmission": surface.transmission}}
+    material |= {"normalTexture": textures["normal"]} if "normal" in textures else {}
+    material |= {"alphaMode": "MASK", "alphaCutoff": surface.cut} if surface.cut else {}
+    return document.add("materials", material)
 
 
 def _add_variant(document: _Document, forest: Forest, number: int, variant: Variant, materials: dict[str, int]) -> None:
@@ -156,16 +156,16 @@ def _add_variant(document: _Document, forest: Forest, number: int, variant: Vari
 def _places(document: _Document, forest: Forest, number: int) -> dict[str, int] | None:
     """Accessors of the plants that a variant shows; None where it shows none."""
     chosen = [(part, np.flatnonzero(part.variant == number)) for part in forest.parts]
-    chosen = [(part, own) for part, own in chosen if len(own)]
+    chosen = [(part, plants) for part, plants in chosen if len(plants)]
     if not chosen:
         return None
 
     def joined(column: Callable[[ForestPart], NDArray]) -> NDArray:
-        return np.concatenate([column(part)[own] for part, own in chosen])
+        return np.concatenate([column(part)[plants] for part, plants in chosen])
 
     turn, seed = joined(lambda part: part.rotation), joined(lambda part: part.seed).view(np.uint64)
     quarters = [((seed >> np.uint64(16 * k)) & np.uint64(0xFFFF)).astype(np.float32) for k in range(4)]
-    found = {
+    attributes = {
         "TRANSLATION": upward(joined(lambda part: part.origin + part.position)).astype(np.float32),
         "ROTATION": np.column_stack([turn[:, 1], turn[:, 3], -turn[:, 2], turn[:, 0]]).astype(np.float32),
         "SCALE": np.repeat(joined(lambda part: part.scale)[:, None], 3, axis=1),
@@ -174,7 +174,7 @@ def _places(document: _Document, forest: Forest, number: int) -> dict[str, int] 
         "_AGE": joined(lambda part: part.age),
         "_HEIGHT": joined(lambda part: part.height),
     }
-    return {name: document.accessor(values) for name, values in found.items()}
+    return {name: document.accessor(values) for name, values in attributes.items()}
 
 
 def _primitive(document: _Document, mesh: MeshBuffers, material: int) -> dict[str, Any]:

@@ -55,15 +55,15 @@ def palette_of(meshes: Sequence[MeshBuffers], wood: bool) -> Palette:
     """Colors that are nearest to those of all faces of meshes, by clusters, and where their coordinates lie."""
     every = np.concatenate([mesh.attributes["tf_color"][1] for mesh in meshes])
     uv = np.concatenate([mesh.attributes["UVMap"][1] for mesh in meshes])
-    some = every[:: max(len(every) // _SAMPLE, 1)]
+    sample = every[:: max(len(every) // _SAMPLE, 1)]
     grid = _WOOD if wood else _LEAVES
     number = grid[0] * grid[1]
-    bright = np.argsort(some.sum(axis=1), kind="stable")
-    colors = some[bright[np.linspace(0, len(some) - 1, number).astype(int)]]
+    bright = np.argsort(sample.sum(axis=1), kind="stable")
+    colors = sample[bright[np.linspace(0, len(sample) - 1, number).astype(int)]]
     for _ in range(_ROUNDS):
-        cell = ((some[:, None] - colors) ** 2).sum(axis=2).argmin(axis=1)
+        cell = ((sample[:, None] - colors) ** 2).sum(axis=2).argmin(axis=1)
         count = np.bincount(cell, minlength=number)[:, None]
-        sums = np.stack([np.bincount(cell, column, number) for column in some.T], axis=1)
+        sums = np.stack([np.bincount(cell, column, number) for column in sample.T], axis=1)
         colors = np.where(count > 0, sums / np.maximum(count, 1), colors).astype(np.float32)
     if wood:  # once around a branch, and a meter along it
         return Palette(colors, np.zeros(2), np.ones(2), grid)
@@ -73,22 +73,22 @@ def palette_of(meshes: Sequence[MeshBuffers], wood: bool) -> Palette:
 
 def in_atlas(level: PlantLevel, palettes: dict[str, Palette]) -> PlantLevel:
     """A level whose leaves have texture coordinates of atlases, by the kind of parts."""
-    made = []
+    parts = []
     for kind, mesh in level.parts:
         if kind in palettes:
             palette = palettes[kind]
             cell = np.repeat(palette.cells_of(mesh.attributes["tf_color"][1]), np.diff(mesh.face_offsets))
             uv = palette.placed(mesh.attributes["UVMap"][1], cell)
             mesh = replace(mesh, attributes={**mesh.attributes, "UVMap": ("CORNER", uv)})
-        made.append((kind, mesh))
-    return replace(level, parts=tuple(made))
+        parts.append((kind, mesh))
+    return replace(level, parts=tuple(parts))
 
 
 def outline(palette: Palette, mesh: MeshBuffers, faces: int = 4000) -> NDArray[np.bool_]:
     """Texels (t, t) of a cell that some faces of a mesh cover."""
     owner, corner = corner_triangles(mesh)
-    some = owner < faces
-    uv = palette.placed(mesh.attributes["UVMap"][1], np.zeros(len(mesh.corner_verts), np.int64))[corner[some]]
+    sampled = owner < faces
+    uv = palette.placed(mesh.attributes["UVMap"][1], np.zeros(len(mesh.corner_verts), np.int64))[corner[sampled]]
     shown = np.zeros((TEXELS, TEXELS), bool)
     flat = np.unique(np.round(uv * (np.array(palette.grid) * TEXELS) - 0.5, 2), axis=0)
     for a, b, c in flat:
@@ -119,8 +119,8 @@ def atlas(palette: Palette, detail: Floats32) -> Floats32:
 def within(detail: Floats32) -> Floats32:
     """A square (t, t, n) as a cell has it, smaller by its margin, beside which it goes on as at its border."""
     inner = TEXELS - 2 * MARGIN
-    at = np.clip((np.arange(TEXELS) - MARGIN + 0.5) / inner * len(detail), 0, len(detail) - 1).astype(int)
-    return detail[at][:, at]
+    texels = np.clip((np.arange(TEXELS) - MARGIN + 0.5) / inner * len(detail), 0, len(detail) - 1).astype(int)
+    return detail[texels][:, texels]
 
 
 def tiled(texels: Floats32) -> Floats32:

@@ -154,12 +154,12 @@ def _corrected(
 
 def _changed(parts: Parts, larger: float, tint: tuple[float, float, float] = _WHITE) -> Parts:
     """Parts with leaves of so many times the area, and factors on all colors."""
-    made = []
+    changed = []
     for kind, mesh in parts:
         color = np.clip(mesh.attributes["tf_color"][1] * np.array(tint, np.float32), 0.0, 1.0)
         mesh = replace(mesh, attributes={**mesh.attributes, "tf_color": ("FACE", color)})
-        made.append((kind, mesh if kind == "bark" else with_area(mesh, larger)))
-    return tuple(made)
+        changed.append((kind, mesh if kind == "bark" else with_area(mesh, larger)))
+    return tuple(changed)
 
 
 def with_area(mesh: MeshBuffers, larger: float) -> MeshBuffers:
@@ -185,12 +185,12 @@ def _outlines(seen: list[PlantView], truth: list[PlantView], grids: list[Grid], 
 
 def _parts(flora: Flora, grown: list[WholeBranches], back: Floats, pixel: float = 0.0) -> Parts:
     """Polygons of a plant as they are enough for a size of pixels, turned back into its own space."""
-    found, made = [*_leaf_parts(flora, grown, pixel), *_wood_parts(flora, grown, pixel)], []
-    for kind in dict.fromkeys(kind for kind, _ in found):
-        mesh = concatenate_buffers([mesh for name, mesh in found if name == kind])
+    meshes, parts = [*_leaf_parts(flora, grown, pixel), *_wood_parts(flora, grown, pixel)], []
+    for kind in dict.fromkeys(kind for kind, _ in meshes):
+        mesh = concatenate_buffers([mesh for name, mesh in meshes if name == kind])
         if mesh is not None:
-            made.append((kind, replace(mesh, positions=in_axes(mesh.positions, back.T))))
-    return tuple(made)
+            parts.append((kind, replace(mesh, positions=in_axes(mesh.positions, back.T))))
+    return tuple(parts)
 
 
 def _leaf_parts(flora: Flora, grown: list[WholeBranches], pixel: float) -> Iterator[tuple[str, MeshBuffers]]:
@@ -207,21 +207,21 @@ def _leaf_parts(flora: Flora, grown: list[WholeBranches], pixel: float) -> Itera
 def _wood_parts(flora: Flora, grown: list[WholeBranches], pixel: float) -> Iterator[tuple[str, MeshBuffers]]:
     for whole in grown:
         if not pixel:
-            made = [tube_buffers(flora, [whole])]
+            meshes = [tube_buffers(flora, [whole])]
         else:
             branches = whole.branches
             wide = 2.0 * branches.radius / pixel
             slender, broad = ((wide >= low) & (wide < high) for low, high in ((_WIDE, _BROAD), (_BROAD, np.inf)))
-            made = [
-                tube_buffers(flora, [whole.take(np.flatnonzero(some))], None, sides)
-                for some, sides in ((slender, 3), (broad, 4))
+            meshes = [
+                tube_buffers(flora, [whole.take(np.flatnonzero(limbs))], None, sides)
+                for limbs, sides in ((slender, 3), (broad, 4))
             ]
             likely = np.clip(np.pi * branches.radius * branches.length / (_LONG * pixel) ** 2, 1e-4, 1.0)
-            some = np.flatnonzero((wide < _WIDE) & (uniform(branches.key, _TWIG) < likely))
-            if len(some):
-                wider, straight = np.minimum(1.0 / likely[some], _WIDER), np.ones(len(some), np.int64)
-                made.append(twig_buffers(flora, whole.take(some), wider, straight))
-        yield from (("bark", mesh) for mesh in made if mesh is not None)
+            limbs = np.flatnonzero((wide < _WIDE) & (uniform(branches.key, _TWIG) < likely))
+            if len(limbs):
+                wider, straight = np.minimum(1.0 / likely[limbs], _WIDER), np.ones(len(limbs), np.int64)
+                meshes.append(twig_buffers(flora, whole.take(limbs), wider, straight))
+        yield from (("bark", mesh) for mesh in meshes if mesh is not None)
 
 
 #: Directions to look from: level ones and such that look down a little, as distant plants are seen.
@@ -253,11 +253,11 @@ class PlantView:
         """How far ends of rows are off those of another view, in cells, on average over rows in which both show some;
         a row in which only one shows anything counts with half of its width.
         """
-        some, all_of = (view.shown.sum(axis=1) for view in (self, other))
-        both = (some > 0) & (all_of > 0)
+        shown, all_of = (view.shown.sum(axis=1) for view in (self, other))
+        both = (shown > 0) & (all_of > 0)
         off = np.abs(self._ends() - other._ends()).mean(axis=1)
-        alone = (some > 0) != (all_of > 0)
-        return float((off[both].sum() + (some + all_of)[alone].sum() / 2.0) / max(both.sum() + alone.sum(), 1))
+        alone = (shown > 0) != (all_of > 0)
+        return float((off[both].sum() + (shown + all_of)[alone].sum() / 2.0) / max(both.sum() + alone.sum(), 1))
 
 
 @dataclass(frozen=True)
@@ -305,10 +305,10 @@ class Grid:
 
     def reaches(self, places: Floats, depth: Floats32, slack: float) -> Mask:
         """Places (k, 3) that nothing hides from the eye, by depths (h × w), but what is within so many meters."""
-        at = in_axes(places, _axes(self.toward))
-        cells = np.floor(at[:, :2] / self.cell).astype(np.int64) - self.low
+        local = in_axes(places, _axes(self.toward))
+        cells = np.floor(local[:, :2] / self.cell).astype(np.int64) - self.low
         column, row = np.clip(cells, 0, np.array(self.shape)[::-1] - 1).T
-        return at[:, 2] >= depth[row * self.shape[1] + column] - slack
+        return local[:, 2] >= depth[row * self.shape[1] + column] - slack
 
     def _draw(self, corners: Sequence[Floats32], owner: Integers, depth: Floats32, face: Integers) -> None:
         """Put triangles of faces (t,) into the cells where they are nearest, by coordinates (3, t) of their corners."""
@@ -319,11 +319,11 @@ class Grid:
         left, below = (np.maximum(np.ceil(_least(of)), 0.0).astype(np.int32) for of in (x, y))
         wide = np.minimum(np.floor(-_least(-x)), columns - 1).astype(np.int32) - left + 1
         tall = np.minimum(np.floor(-_least(-y)), rows - 1).astype(np.int32) - below + 1
-        some = np.flatnonzero((wide > 0) & (tall > 0))  # most triangles of fine plants have no middle of a cell
-        for run in chunks((wide[some] * tall[some]).astype(np.float64), _BATCH):
-            own = some[run]
-            of, index = spread((wide[own] * tall[own]).astype(np.int64))
-            of = own[of]
+        drawn = np.flatnonzero((wide > 0) & (tall > 0))  # most triangles of fine plants have no middle of a cell
+        for run in chunks((wide[drawn] * tall[drawn]).astype(np.float64), _BATCH):
+            batch = drawn[run]
+            of, index = spread((wide[batch] * tall[batch]).astype(np.int64))
+            of = batch[of]
             column, row = left[of] + index % wide[of], below[of] + index // wide[of]
             ax, ay = x[:, of] - column.astype(np.float32), y[:, of] - row.astype(np.float32)
             weights = [ax[i] * ay[j] - ay[i] * ax[j] for i, j in ((1, 2), (2, 0), (0, 1))]

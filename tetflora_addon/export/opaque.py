@@ -77,7 +77,7 @@ def _sides(meshes: Sequence[MeshBuffers]) -> Floats:
     cell = float(np.ptp(points, axis=0).max()) / _CELLS
     lamps = [(Grid.around(toward, cell, points, cell), *more) for toward, *more in _lamps()]
     shadows = [lamp.nearest(meshes)[0] for lamp, *_ in lamps]
-    found, every = np.zeros((3, len(meshes))), np.zeros(len(meshes))
+    lit, every = np.zeros((3, len(meshes))), np.zeros(len(meshes))
     for grid in (Grid.around(toward, cell, points, cell) for toward in _VIEWS):
         depth, face = grid.nearest(meshes)
         face, place = face[depth > -np.inf], grid.places(depth)
@@ -86,10 +86,10 @@ def _sides(meshes: Sequence[MeshBuffers]) -> Floats:
             falls = normal[face] @ lamp.toward
             light = bright * np.abs(falls)
             seen = light * np.where(lamp.reaches(place, shadow, _SLACK * cell), 1.0, passing)
-            np.add.at(found, (np.where(front == (falls > 0.0), np.where(front, 0, 1), 2), part[face]), seen)
+            np.add.at(lit, (np.where(front == (falls > 0.0), np.where(front, 0, 1), 2), part[face]), seen)
             np.add.at(every, part[face], light)
-    shaded = 1.0 - found.sum(axis=0) / np.maximum(every, 1e-30)
-    return np.column_stack([*(found / np.maximum(found[:2].sum(axis=0), 1e-30)), shaded])
+    shaded = 1.0 - lit.sum(axis=0) / np.maximum(every, 1e-30)
+    return np.column_stack([*(lit / np.maximum(lit[:2].sum(axis=0), 1e-30)), shaded])
 
 
 def _lamps() -> Iterator[tuple[Floats, float, float]]:

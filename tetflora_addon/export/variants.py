@@ -49,33 +49,33 @@ def choose_variants(flora: Flora, seeds: Seeds, most: int) -> Variants:
     plants: list[Integers] = []
     first = 0
     for kind in np.flatnonzero(np.bincount(seeds.species)).tolist():
-        own = np.flatnonzero(seeds.species == kind)
-        length, features = _features(flora, seeds, own)
-        if len(own) <= most:
-            chosen, nearest = np.arange(len(own)), np.arange(len(own))
+        alike = np.flatnonzero(seeds.species == kind)
+        length, features = _features(flora, seeds, alike)
+        if len(alike) <= most:
+            chosen, nearest = np.arange(len(alike)), np.arange(len(alike))
         else:
-            some = _sample(seeds.seed[own])
-            chosen = some[_medoids(features[some], most)]
+            sample = _sample(seeds.seed[alike])
+            chosen = sample[_medoids(features[sample], most)]
             nearest = _nearest(features, features[chosen])
-        plants.append(own[chosen])
-        variant[own] = first + nearest
-        scale[own] = length / (length[chosen] / seeds.scale[own[chosen]])[nearest]
+        plants.append(alike[chosen])
+        variant[alike] = first + nearest
+        scale[alike] = length / (length[chosen] / seeds.scale[alike[chosen]])[nearest]
         first += len(chosen)
     return Variants(variant, scale, np.concatenate([np.zeros(0, np.int64), *plants]))
 
 
-def _features(flora: Flora, seeds: Seeds, own: Integers) -> tuple[Floats, Floats]:
+def _features(flora: Flora, seeds: Seeds, plants: Integers) -> tuple[Floats, Floats]:
     """Lengths (m,) of trunks of some plants (m,), and what else they differ in (m, f), each with the same spread."""
-    length, rows = np.zeros(len(own)), []
-    for begin in range(0, len(own), _CHUNK):
-        some = seeds.take(own[begin : begin + _CHUNK])
-        trunk = trunks(flora.rows, some)
+    length, rows = np.zeros(len(plants)), []
+    for begin in range(0, len(plants), _CHUNK):
+        chunk = seeds.take(plants[begin : begin + _CHUNK])
+        trunk = trunks(flora.rows, chunk)
         length[begin : begin + _CHUNK] = trunk.length
-        found = [np.log(np.maximum(trunk.length, 1e-9)), np.log(np.maximum(trunk.radius / trunk.length, 1e-9))]
-        if some.crown is not None:
-            found += [np.log(some.crown[:, each]) for each in (WIDTH, THICKNESS, LEAVES)]
-            found += [some.crown[:, BASE], np.hypot(some.crown[:, EAST], some.crown[:, NORTH])]
-        rows.append(np.stack(found, axis=1))
+        columns = [np.log(np.maximum(trunk.length, 1e-9)), np.log(np.maximum(trunk.radius / trunk.length, 1e-9))]
+        if chunk.crown is not None:
+            columns += [np.log(chunk.crown[:, each]) for each in (WIDTH, THICKNESS, LEAVES)]
+            columns += [chunk.crown[:, BASE], np.hypot(chunk.crown[:, EAST], chunk.crown[:, NORTH])]
+        rows.append(np.stack(columns, axis=1))
     features = np.concatenate(rows)
     spread = features.std(axis=0)
     features /= np.where(spread > _SPREAD, spread, np.inf)
@@ -113,4 +113,4 @@ def _nearest(features: Floats, middles: Floats) -> Integers:
     """Index (n,) of the middle (v, f) that is nearest to each plant (n, f)."""
     chunks = [features[begin : begin + _CHUNK] for begin in range(0, len(features), _CHUNK)]
     square = (middles**2).sum(axis=1)
-    return np.concatenate([(square - 2.0 * some @ middles.T).argmin(axis=1) for some in chunks])
+    return np.concatenate([(square - 2.0 * chunk @ middles.T).argmin(axis=1) for chunk in chunks])

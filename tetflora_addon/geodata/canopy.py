@@ -178,14 +178,14 @@ def _hidden_by(flat: Floats32, summits: Integers, stride: int, cell: float) -> J
         yield Progress(0.3 + 0.4 * (i + most) / max(2 * most, 1), "Looking for treetops")
         for j in range(-most, most + 1):
             reach = np.hypot(i, j)
-            some = order[: np.searchsorted(-radius[order], -reach, side="right")]  # those with windows as wide
-            if reach == 0.0 or not len(some):
+            wide = order[: np.searchsorted(-radius[order], -reach, side="right")]  # those with windows as wide
+            if reach == 0.0 or not len(wide):
                 continue
-            row, column = summits[some] // stride + i, summits[some] % stride + j
+            row, column = summits[wide] // stride + i, summits[wide] % stride + j
             within = (row >= 0) & (row < rows) & (column >= 0) & (column < stride)
-            some, other = some[within], (row * stride + column)[within]
-            higher = _before(flat[other], other, best[some], target[some])
-            best[some[higher]], target[some[higher]] = flat[other[higher]], other[higher]
+            wide, other = wide[within], (row * stride + column)[within]
+            higher = _before(flat[other], other, best[wide], target[wide])
+            best[wide[higher]], target[wide[higher]] = flat[other[higher]], other[higher]
     return target
 
 

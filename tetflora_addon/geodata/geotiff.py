@@ -186,8 +186,8 @@ class _Tags:
         where = f"{kind.title()}Offsets"
         self.one(where)  # it is there
         offsets, sizes = self.numbers(where), self.numbers(f"{kind.title()}ByteCounts")
-        there = all(a >= 0 and b >= 0 and a + b <= self.size for a, b in zip(offsets, sizes, strict=False))
-        if len(offsets) != len(sizes) or not there:
+        complete = all(a >= 0 and b >= 0 and a + b <= self.size for a, b in zip(offsets, sizes, strict=False))
+        if len(offsets) != len(sizes) or not complete:
             raise self.broken(where, f"leads beyond the end of the file; {_DAMAGED}")
         samples = 1 if self.one("PlanarConfiguration", 1) == 2 else self.one("SamplesPerPixel", 1)
         predictor, compression, order = (self.one(tag, 1) for tag in ("Predictor", "Compression", "FillOrder"))
@@ -242,7 +242,7 @@ class _Tags:
 
     def mask(self, shape: tuple[int, int]) -> Job[Mask]:
         """Which pixels count, (h, w), by a mask that is another image of the file; yields progress."""
-        own, seen = self.found, set()
+        directory, seen = self.found, set()
         try:
             while self.next and self.next not in seen and len(seen) < _MOST_IMAGES:
                 seen.add(self.next)
@@ -251,20 +251,20 @@ class _Tags:
                     values, absent = yield from self.pixels()
                     return (values != 0) & ~absent
         finally:
-            self.found = own
+            self.found = directory
         return np.ones(shape, bool)
 
     def scale(self) -> tuple[np.float32, np.float32]:
         """Factor and summand of values, as GDAL's metadata have them."""
         text, out = self.text("GDAL_METADATA"), []
         for role, usual in (("scale", 1.0), ("offset", 0.0)):
-            found = re.search(rf'<Item[^>]*\brole="{role}"[^>]*>([^<]*)<', text)
+            match = re.search(rf'<Item[^>]*\brole="{role}"[^>]*>([^<]*)<', text)
             try:
-                value = float(found[1]) if found else usual
+                value = float(match[1]) if match else usual
             except ValueError:
                 value = math.nan
             if not abs(value) < 1e6:
-                raise self.broken("GDAL_METADATA", f"has a {role} of {quoted(found[1])}")
+                raise self.broken("GDAL_METADATA", f"has a {role} of {quoted(match[1])}")
             out.append(np.float32(value))
         return out[0], out[1]
 
@@ -273,8 +273,8 @@ class _Tags:
         geo, known = self.keys(), known_systems()
         for key in ("ProjectedCitation", "GTCitation", "GeodeticCitation"):
             text = re.search(r"(?:PROJCS|GEOGCS)\s*\[.*", str(geo.get(key, "")), re.DOTALL)
-            if text and (found := system_in(text[0])).epsg:
-                return found
+            if text and (cited := system_in(text[0])).epsg:
+                return cited
         flat, degrees = geo.get("GeodeticCRS", 0), geo.get("GTModelType") == 2
         code = flat if degrees else geo.get("ProjectedCRS", 0)
         unit = float(geo.get("ProjLinearUnitSize", 0.0) or _UNITS.get(geo.get("ProjLinearUnits", 9001), 1.0))
@@ -327,13 +327,13 @@ class _Tags:
             raise self.broken("GeoKeyDirectory", f"tells of {values[3]} keys and is too short for them")
         doubles, texts = self.numbers("GeoDoubleParams"), self.text("GeoAsciiParams")
         out: dict[str, Any] = {}
-        for key, place, number, at in np.array(values[4 : 4 + 4 * int(values[3])], np.int64).reshape(-1, 4).tolist():
+        for key, place, number, entry in np.array(values[4 : 4 + 4 * int(values[3])], np.int64).reshape(-1, 4).tolist():
             if place == 0:
-                out[_KEYS.get(key, "")] = at
-            elif _TAGS.get(place) == "GeoDoubleParams" and 0 <= at < len(doubles):
-                out[_KEYS.get(key, "")] = doubles[at] if number == 1 else doubles[at : at + number]
+                out[_KEYS.get(key, "")] = entry
+            elif _TAGS.get(place) == "GeoDoubleParams" and 0 <= entry < len(doubles):
+                out[_KEYS.get(key, "")] = doubles[entry] if number == 1 else doubles[entry : entry + number]
             elif _TAGS.get(place) == "GeoAsciiParams":
-                out[_KEYS.get(key, "")] = texts[at : at + number]
+                out[_KEYS.get(key, "")] = texts[entry : entry + number]
         return out
 
     def nothing(self) -> float | None:
@@ -379,23 +379,23 @@ def _lzw(data: bytes, most: int) -> bytes:
     codes by jumping along chains, and then bytes, each round twice as far.
     """
     bits = np.unpackbits(np.frombuffer(data, np.uint8))
-    out, at, size, ended = [], 0, 0, False
+    out, bit, size, ended = [], 0, 0, False
     while size < most and not ended:
-        found: list[Integers] = []
+        runs: list[Integers] = []
         for width, number in _WIDTHS:
-            whole = min(number, (len(bits) - at) // width)
-            codes = bits[at : at + whole * width].reshape(whole, width) @ _PLACES[12 - width :]
+            whole = min(number, (len(bits) - bit) // width)
+            codes = bits[bit : bit + whole * width].reshape(whole, width) @ _PLACES[12 - width :]
             marks = np.flatnonzero((codes == _CLEAR) | (codes == _END))
             stop = int(marks[0]) if len(marks) else whole
-            found.append(codes[:stop])
-            at += (stop + 1) * width
+            runs.append(codes[:stop])
+            bit += (stop + 1) * width
             if len(marks) or whole < number:
                 ended = not len(marks) or codes[stop] == _END
                 break
-            at -= width
+            bit -= width
         else:
             raise ValueError("its table of codes overflows")
-        part, broken = _strings(np.concatenate(found))
+        part, broken = _strings(np.concatenate(runs))
         out.append(part)
         size, ended = size + len(part), ended or broken
     return b"".join(out)[:most]
@@ -425,11 +425,11 @@ def _strings(codes: Integers) -> tuple[bytes, bool]:
 
 def _packed(data: bytes, most: int) -> bytes:
     """PackBits: pieces to take as they are, and bytes to repeat."""
-    out, at, size = [], 0, 0
-    while size < most and at < len(data):
-        head = data[at]
-        part = data[at + 1 : at + 2 + head] if head < 128 else data[at + 1 : at + 2] * (257 - head) * (head != 128)
-        at += 2 + head if head < 128 else 1 if head == 128 else 2
+    out, byte, size = [], 0, 0
+    while size < most and byte < len(data):
+        head, rest = data[byte], data[byte + 1 : byte + 129]
+        part = rest[: head + 1] if head < 128 else rest[:1] * (257 - head) * (head != 128)
+        byte += 2 + head if head < 128 else 1 if head == 128 else 2
         out.append(part)
         size += len(part)
     return b"".join(out)[:most]

@@ -52,8 +52,8 @@ def read_grid(path: Path) -> Job[Raster]:
 
 def _hgt(path: Path) -> Raster:
     """A tile of a degree; its name tells its south-western corner."""
-    found = re.match(r"([NS])(\d{1,2})([EW])(\d{1,3})", path.stem, re.IGNORECASE)
-    if not found:
+    match = re.match(r"([NS])(\d{1,2})([EW])(\d{1,3})", path.stem, re.IGNORECASE)
+    if not match:
         raise SceneError(f"{path.name}: a .hgt file has its place in its name, such as N48E009.hgt; name it so")
     content = read_whole(path, 4 * 10**8)
     side = round((len(content) / 2) ** 0.5)
@@ -62,7 +62,7 @@ def _hgt(path: Path) -> Raster:
             f"{path.name}: {len(content):,} bytes are no square of 16-bit values; it is damaged; get it again"
         )
     checked_size(side, side, f"{path.name}: ")
-    south, west = (int(found[k + 1]) * (-1 if found[k].upper() in "SW" else 1) for k in (1, 3))
+    south, west = (int(match[k + 1]) * (-1 if match[k].upper() in "SW" else 1) for k in (1, 3))
     values = np.frombuffer(content, ">i2").reshape(side, side).astype(np.float32)
     step = 1.0 / (side - 1)
     corner = np.array([west, south + 1.0])
@@ -80,24 +80,24 @@ def _xyz(path: Path) -> Job[Raster]:
     if head.count(b";") >= 2:
         content, head = content.replace(b",", b"."), head.replace(b",", b".")
     yield Progress(0.1, f"Reading {name}")
-    found = numbers_in(content.translate(bytes.maketrans(b",;\t", b"   ")), name, line)
+    numbers = numbers_in(content.translate(bytes.maketrans(b",;\t", b"   ")), name, line)
     columns = len(head.translate(bytes.maketrans(b",;", b"  ")).split())
-    if columns < 3 or len(found) % columns or len(found) < 4 * columns:
+    if columns < 3 or len(numbers) % columns or len(numbers) < 4 * columns:
         raise SceneError(f"{name}: line {line}: each line must have x, y and height; correct it")
     yield Progress(0.5, f"Reading {name}")
-    places = found.reshape(-1, columns)[:, :3]
+    places = numbers.reshape(-1, columns)[:, :3]
     steps = _step(places[:, 0], name, "x"), _step(places[:, 1], name, "y")
     return _gridded(places, steps, name, system_beside(path), nothing=-9999.0)
 
 
 def _step(values: Floats, name: str, what: str) -> float:
     """The step of evenly spaced places."""
-    some = np.unique(values)
-    gaps = np.diff(some)
+    places = np.unique(values)
+    gaps = np.diff(places)
     gaps = gaps[gaps > 1e-3 * gaps.max(initial=0.0)]
     step = float(np.median(gaps[gaps < 1.5 * gaps.min()])) if len(gaps) else 0.0
-    number = np.rint((some - some[0]) / step) if step > 0.0 else np.full(len(some), np.inf)
-    if not number.max() < 1e6 or np.abs((some - some[0]) / step - number).max() > max(_EVEN, 1e-4 * number.max()):
+    number = np.rint((places - places[0]) / step) if step > 0.0 else np.full(len(places), np.inf)
+    if not number.max() < 1e6 or np.abs((places - places[0]) / step - number).max() > max(_EVEN, 1e-4 * number.max()):
         raise SceneError(
             f"{name}: its values of {what} are not evenly spaced; these are points and no grid. Make one of them, for "
             "example with gdal_grid"
@@ -136,27 +136,27 @@ def _usgs(path: Path) -> Raster:
         scale = 1.0 / 3600.0 if units == 3 else {1: 0.3048, 2: 1.0}[units]
         if not (plane in (0, 1) and dx > 0.0 < dy and 1 < profiles < 20_000):
             raise ValueError
-        at, found = _RECORD, []
+        byte, points = _RECORD, []
         for _ in range(profiles):
-            number = int(content[at + 12 : at + 18])
-            x, y, base = (real(at + a, at + a + 24) for a in (24, 48, 72))
+            number = int(content[byte + 12 : byte + 18])
+            x, y, base = (real(byte + a, byte + a + 24) for a in (24, 48, 72))
             records = 1 + -(-max(number - _FIRST, 0) // _LATER)
-            there = at + (records - 1) * _RECORD < len(content)
-            if not (0 < number < 70_000 and np.isfinite((x, y, base)).all() and there):
+            complete = byte + (records - 1) * _RECORD < len(content)
+            if not (0 < number < 70_000 and np.isfinite((x, y, base)).all() and complete):
                 raise ValueError
-            block = content[at : at + records * _RECORD].ljust(records * _RECORD)
+            block = content[byte : byte + records * _RECORD].ljust(records * _RECORD)
             text = block[144 : 144 + _FIRST * _VALUE]
             text += b"".join(block[k * _RECORD : k * _RECORD + _LATER * _VALUE] for k in range(1, records))
             numbers = np.frombuffer(text, f"S{_VALUE}", number).astype(np.float64)
             z = np.where(numbers <= -32767, np.nan, numbers * per + base)
-            found.append(np.stack([np.full(number, x), y + dy * np.arange(number), z], axis=1))
-            at += records * _RECORD
+            points.append(np.stack([np.full(number, x), y + dy * np.arange(number), z], axis=1))
+            byte += records * _RECORD
     except (ValueError, KeyError, IndexError, OverflowError):
         raise SceneError(
             f"{name}: neither an ASCII grid nor an elevation model of the USGS, or damaged; export it as GeoTIFF"
         ) from None
     system = System(4267) if plane == 0 else System(26700 + zone) if 1 <= zone <= 22 else System()
-    return _gridded(np.concatenate(found), (dx, dy), name, system, scale)
+    return _gridded(np.concatenate(points), (dx, dy), name, system, scale)
 
 
 def mosaic(tiles: Sequence[Raster], names: Sequence[str]) -> Raster:

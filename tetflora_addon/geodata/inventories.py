@@ -85,10 +85,10 @@ def _cut(text: str) -> list[str]:
             elif end == len(text) and part in begun and len(part) >= (_SHORTEST if start == 0 else 3):
                 ways.append((cost + 1.5, [*before, begun[part]]))
         best.append(min(ways, key=lambda way: way[0]))
-    found = best[-1][1]
+    parts = best[-1][1]
     # Short words within others are chance: "age" in "page", "art" in "start".
-    chance = any(word.startswith("?") for word in found)
-    return [word if len(word) >= _SHORTEST or not chance else "?" + word.lstrip("?") for word in found]
+    chance = any(word.startswith("?") for word in parts)
+    return [word if len(word) >= _SHORTEST or not chance else "?" + word.lstrip("?") for word in parts]
 
 
 @cache
@@ -133,7 +133,7 @@ def _field(meant: set[str]) -> tuple[str, int]:
     """
     for rule, name, doubt in _TABLE["rules"]:
         parts = [(part[0], meant.intersection(part.lstrip("!=").split("|"))) for part in rule.split()]
-        if all(some == meant if way == "=" else bool(some) != (way == "!") for way, some in parts):
+        if all(common == meant if way == "=" else bool(common) != (way == "!") for way, common in parts):
             return name, doubt
     return "", 0
 
@@ -246,17 +246,17 @@ def preview(path: Path) -> list[Column]:
 def _table(path: Path, skip: bool, most: int | None = None, epsg: int = 0) -> Table:
     """Rows of a file, of which there is at least one."""
     layer = path.suffix.lower() in ENDINGS
-    found = read_points(path, skip, most, epsg) if layer else read_csv(path, skip, most)
-    if not len(found.numbers):
+    table_ = read_points(path, skip, most, epsg) if layer else read_csv(path, skip, most)
+    if not len(table_.numbers):
         raise SceneError(
-            found.first
-            or f"{found.name}: it has no {'points' if found.points is not None else 'rows'}; choose another one"
+            table_.first
+            or f"{table_.name}: it has no {'points' if table_.points is not None else 'rows'}; choose another one"
         )
-    return found
+    return table_
 
 
 def _chosen(table_: Table, columns: Mapping[str, str]) -> dict[str, Title]:
-    found = {}
+    chosen = {}
     for title, text in columns.items():
         name, _, unit = text.strip().partition(" ")
         meters = read_title(f"height {unit}").unit if unit else 0.0
@@ -266,42 +266,42 @@ def _chosen(table_: Table, columns: Mapping[str, str]) -> dict[str, Title]:
         if why:
             raise SceneError(f"{table_.name}: column {quoted(title)}: {why}; correct Columns")
         told = read_title(title)
-        found[title] = Title(name, meters or told.unit, told.doubt if told.field == name else -1)
-    return found
+        chosen[title] = Title(name, meters or told.unit, told.doubt if told.field == name else -1)
+    return chosen
 
 
 def taken_for(table_: Table, chosen: Mapping[str, Title]) -> dict[str, Title]:
     """What each column is taken for, by its title and its first values."""
-    found, samples = dict(chosen), {}
+    titles, samples = dict(chosen), {}
     decided = {title.field for title in chosen.values()}.difference(NAMES, ("status", "dead"))
     for title, texts in table_.columns.items():
         if title not in chosen:
             sample = samples[title] = np.unique(texts[: 4 * _PREVIEWED])[: 4 * _SAMPLE]
             sample = samples[title] = sample[sample != ""][:_SAMPLE]
-            found[title] = _confirmed(read_title(title), sample)
-            if found[title].field in decided:
-                found[title] = found[title]._replace(field="")
-    fields = {title.field for title in found.values()}
+            titles[title] = _confirmed(read_title(title), sample)
+            if titles[title].field in decided:
+                titles[title] = titles[title]._replace(field="")
+    fields = {title.field for title in titles.values()}
     if "longitude" in fields and "latitude" not in fields:  # the German word for latitude is that for width, too
-        found |= {title: Title("latitude", 0.0, 1) for title in samples if title.lower() == "breite"}
-        fields = {title.field for title in found.values()}
-    free = [title for title in samples if not found[title].field and found[title].doubt < NEVER]
+        titles |= {title: Title("latitude", 0.0, 1) for title in samples if title.lower() == "breite"}
+        fields = {title.field for title in titles.values()}
+    free = [title for title in samples if not titles[title].field and titles[title].doubt < NEVER]
     if table_.points is None and not ({"longitude", "latitude"} <= fields or {"x", "y"} <= fields or "place" in fields):
-        _by_values(found, free, samples, "place", 0.9)
+        _by_values(titles, free, samples, "place", 0.9)
     if not fields.intersection(NAMES):
-        _by_values(found, free, samples, "name", 0.5)
+        _by_values(titles, free, samples, "name", 0.5)
     sizes = fields.intersection((*_MOST, *NAMES))
-    for title in [title for title in samples if found[title].field == "z"]:  # treetops of a laser scan
-        found[title] = found[title]._replace(field="" if sizes else "height")
-    return {title: found[title] for title in table_.columns}
+    for title in [title for title in samples if titles[title].field == "z"]:  # treetops of a laser scan
+        titles[title] = titles[title]._replace(field="" if sizes else "height")
+    return {title: titles[title] for title in table_.columns}
 
 
-def _by_values(found: dict[str, Title], free: list[str], samples: dict[str, _Texts], name: str, least: float) -> None:
+def _by_values(titles: dict[str, Title], free: list[str], samples: dict[str, _Texts], name: str, least: float) -> None:
     """Take the column for a field whose values suit best."""
     shares = {title: _share(name, samples[title]) for title in free}
     best = max(shares, key=lambda title: shares[title], default="")
     if best and shares[best] >= least:
-        found[best] = Title(name, 0.0, 1)
+        titles[best] = Title(name, 0.0, 1)
 
 
 def _share(name: str, sample: _Texts) -> float:
@@ -382,7 +382,7 @@ class _Reading:
 
     def _texts(self, title: str) -> _Texts:
         """Texts of a column, which is one that is used."""
-        self.used[title] = next(name for name, found in self.found.items() if title in dict(found))
+        self.used[title] = next(name for name, columns in self.found.items() if title in dict(columns))
         return self.table.columns[title]
 
     def _each(self, title: str, what: Callable[[str], Any]) -> NDArray[Any]:
@@ -421,8 +421,8 @@ class _Reading:
             return np.zeros(len(self.good))
         chosen = read[0]
         for other in read[1:]:  # classes beside what they stand for
-            (_, _, bare, _, own), middle = chosen, other[2]
-            both = (own == NUMBER) & (other[4] == RANGE) & (middle > 0.0)
+            (_, _, bare, _, kind), middle = chosen, other[2]
+            both = (kind == NUMBER) & (other[4] == RANGE) & (middle > 0.0)
             if both.any() and np.median(np.abs(bare[both] / middle[both] - 1.0)) > 0.5:
                 chosen = other
         title, what, values, units, kinds = chosen
@@ -455,8 +455,8 @@ class _Reading:
         else:
             centimeters, millimeters = _SMALLER.get(name, (_MOST[name], 100.0 * _MOST[name]))
             middle = float(np.median(known))
-            found = (1.0, "m"), (0.01, "cm"), (0.001, "mm")
-            unit, text = found[int(middle > centimeters) + int(middle > millimeters)]
+            units = (1.0, "m"), (0.01, "cm"), (0.001, "mm")
+            unit, text = units[int(middle > centimeters) + int(middle > millimeters)]
             if name not in _TRUNKS and unit == 1.0:
                 return unit
         self.notes.append(f'"{title}" read as {text}')
@@ -467,7 +467,7 @@ class _Reading:
         if "planted" not in self.found:
             return np.zeros(len(self.good))
         title = self.found["planted"][0][0]
-        years = self._each(title, lambda text: int(found[0]) if (found := _YEAR.search(text)) else 0)
+        years = self._each(title, lambda text: int(match[0]) if (match := _YEAR.search(text)) else 0)
         now = datetime.date.today().year
         self.notes.append(f'ages from "{title}" to {now}')
         return np.where(years > 0, np.maximum(now - years, 1), 0).astype(np.float64)
@@ -497,8 +497,8 @@ class _Reading:
             if meters in more and epsg and not chosen_system(epsg, System(), "").geographic:
                 pair = meters
             if pair == one:
-                points, own = self._places()
-                epsg = epsg or own
+                points, code = self._places()
+                epsg = epsg or code
                 plain = (np.abs(points[self.good]) > (360.0, 180.0)).any()
             else:
                 points = np.stack([self._coordinate(column) for column in pair], axis=1)
@@ -511,8 +511,8 @@ class _Reading:
                 self.notes.append("x and y read as longitude and latitude")
             system = chosen_system(epsg or (0 if plain else LONGITUDE_LATITUDE), System(), f"{name}: ")
         if system.geographic:
-            some = np.abs(points[self.good])
-            if len(some) and 90.0 < np.median(some[:, 1]) <= 180.0 and np.median(some[:, 0]) <= 90.0:
+            amount = np.abs(points[self.good])
+            if len(amount) and 90.0 < np.median(amount[:, 1]) <= 180.0 and np.median(amount[:, 0]) <= 90.0:
                 points = points[:, ::-1]
                 self.notes.append("coordinates read as latitude, longitude")
             self._refuse(
@@ -541,16 +541,16 @@ class _Reading:
         """Coordinates that stand in one column, and the EPSG code that stands there too, or 0."""
         title = self.found["place"][0][0]
         texts = self._texts(title)
-        found = np.array([place_in(text) for text in texts.tolist()], np.float64).reshape(-1, 3)
-        points, plain = found[:, :2], found[:, 2] < 0.0
+        places = np.array([place_in(text) for text in texts.tolist()], np.float64).reshape(-1, 3)
+        points, plain = places[:, :2], places[:, 2] < 0.0
         self._refuse(np.isnan(points).any(axis=1), "place", lambda i: f"{quoted(str(texts[i]))} is no place")
         points = np.where(np.isnan(points), 0.0, points)
-        some = np.abs(points[plain & self.good])
-        first = bool(re.match(r"(?i).*lon.*lat|.*\bx.*y\b", title)) or (len(some) > 0 and (some[:, 0] > 90.0).any())
-        if len(some) and (some <= 180.0).all() and not first:  # latitude comes first, unless it cannot be one
+        amount = np.abs(points[plain & self.good])
+        first = bool(re.match(r"(?i).*lon.*lat|.*\bx.*y\b", title)) or (len(amount) > 0 and (amount[:, 0] > 90.0).any())
+        if len(amount) and (amount <= 180.0).all() and not first:  # latitude comes first, unless it cannot be one
             points[plain] = points[plain][:, ::-1]
             self.notes.append(f'"{title}" read as latitude, longitude')
-        return points, int(found[:, 2].max(initial=0.0))
+        return points, int(places[:, 2].max(initial=0.0))
 
     def _coordinate(self, column: str) -> Floats:
         """Numbers (n,) of a column of coordinates, in meters or degrees."""
@@ -571,8 +571,8 @@ class _Reading:
             return ((),), np.zeros(len(self.good), np.int64)
         codes = np.zeros(len(self.good), np.int64)
         for title in titles:  # numbers of combinations, column by column
-            distinct, own = np.unique(self._texts(title), return_inverse=True)
-            codes = np.unique(codes * len(distinct) + own, return_inverse=True)[1]
+            distinct, index = np.unique(self._texts(title), return_inverse=True)
+            codes = np.unique(codes * len(distinct) + index, return_inverse=True)[1]
         first = np.unique(codes, return_index=True)[1]
         rows = zip(*(self.table.columns[title][first].tolist() for title in titles), strict=True)
         return tuple(_ordered(row[:genera], row[genera : genera + names], row[genera + names :]) for row in rows), codes

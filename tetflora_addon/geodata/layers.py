@@ -176,17 +176,17 @@ def _shapes(path: Path) -> tuple[list[_Feature], System]:
     if content[:4] != b"\0\0\x27\x0a":
         raise SceneError(f"{path.name}: this is no shapefile; choose another one")
     rows = _dbase(path)
-    features, at = [], 100
-    while at + 12 <= len(content):
-        size = 2 * int.from_bytes(content[at + 4 : at + 8])
-        record = content[at + 8 : at + 8 + size]
+    features, byte = [], 100
+    while byte + 12 <= len(content):
+        size = 2 * int.from_bytes(content[byte + 4 : byte + 8])
+        record = content[byte + 8 : byte + 8 + size]
         if len(record) < size or size < 4:
             raise ValueError
         number = len(features)
         properties = rows[number] if rows is not None and number < len(rows) else {}
         geometry = None if properties is None else _shape(record)  # it is deleted
         features.append({"geometry": geometry, "properties": properties or {}, LAYER: path.stem})
-        at += 8 + size
+        byte += 8 + size
         if len(features) > MAX_ROWS:
             raise SceneError(f"{path.name}: more than {MAX_ROWS:,} features; cut it")
     return features, system_beside(path)
@@ -220,9 +220,9 @@ def _shape(record: bytes) -> _Feature | None:
     return {"type": "MultiPolygon", "coordinates": [[ring.tolist() for ring in area] for area in areas]}
 
 
-def _points(data: bytes, at: int, number: int) -> Floats:
+def _points(data: bytes, byte: int, number: int) -> Floats:
     """Points (n, 2) that begin at some byte."""
-    return np.frombuffer(data, "<f8", 2 * number, at).reshape(-1, 2)
+    return np.frombuffer(data, "<f8", 2 * number, byte).reshape(-1, 2)
 
 
 def _turn(ring: Floats) -> float:
@@ -254,15 +254,15 @@ def _dbase(path: Path) -> list[dict[str, Any] | None] | None:
         return value.decode("cp1252", "replace")
 
     number, start, size = struct.unpack_from("<IHH", content, 4)
-    fields = (content[at : at + 32] for at in range(32, start - 31, 32))
+    fields = (content[byte : byte + 32] for byte in range(32, start - 31, 32))
     fields = list(takewhile(lambda field: field[0] != 0x0D, fields))
     if number > MAX_ROWS or not size or start + number * size > len(content) + 1:
         raise ValueError
     row = struct.Struct("c" + "".join(f"{field[16]}s" for field in fields))
     titles = [text(field[:11].split(b"\0")[0]) for field in fields]
     rows: list[dict[str, Any] | None] = []
-    for at in range(start, start + number * size, size):
-        mark, *values = row.unpack(content[at : at + row.size].ljust(row.size))
+    for byte in range(start, start + number * size, size):
+        mark, *values = row.unpack(content[byte : byte + row.size].ljust(row.size))
         values = [text(value.strip(b"\0 ")) for value in values]
         rows.append(None if mark == b"*" else dict(zip(titles, values, strict=True)))
     return rows
@@ -283,9 +283,9 @@ def _package(path: Path) -> tuple[list[_Feature], System]:
             ).fetchall()
             for table, column, by, code, text in layers:
                 known = str(by).upper() == "EPSG" and code in known_systems()
-                own = System(int(code)) if known else system_in(str(text))
-                first = first or own
-                if own != first:
+                system = System(int(code)) if known else system_in(str(text))
+                first = first or system
+                if system != first:
                     raise SceneError(
                         f"{path.name}: its layers have several coordinate systems; write one of them, for example with "
                         f"ogr2ogr {table}.gpkg {path.name} {table}"

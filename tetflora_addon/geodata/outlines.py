@@ -75,7 +75,7 @@ def read_outlines(path: Path, epsg: int = 0, kind: str = "") -> tuple[list[MapFe
         It cannot be read, is broken, or has no outlines; names the feature.
     """
     features, system = read_features(path, epsg)
-    found: list[MapFeature] = []
+    outlines: list[MapFeature] = []
     points = slivers = 0
     for number, feature in enumerate(features, 1):
         where = f"{path.name}: feature {number:,}"
@@ -90,20 +90,20 @@ def read_outlines(path: Path, epsg: int = 0, kind: str = "") -> tuple[list[MapFe
                 slivers += 1
                 continue
             rings = tuple(ring for ring in rings if len(ring) > 2 or not closed)
-            found.append(_outline(tags, names, rings, closed, kind))
-        if len(found) > MAX_OUTLINES or points > MAX_POINTS:
+            outlines.append(_outline(tags, names, rings, closed, kind))
+        if len(outlines) > MAX_OUTLINES or points > MAX_POINTS:
             raise SceneError(
                 f"{path.name}: more than {MAX_OUTLINES:,} outlines, or {MAX_POINTS:,} points; cut it, for example with "
                 "ogr2ogr -spat"
             )
-    if not found:
+    if not outlines:
         few = f" but {slivers:,} of too few points" if slivers else ""
         raise SceneError(f"{path.name}: it has no areas and no lines{few}")
     notes = [f"{slivers:,} of too few points left out"] if slivers else []
-    others = sum(feature.kind == OTHER for feature in found)
-    if 2 * others > len(found):
+    others = sum(feature.kind == OTHER for feature in outlines)
+    if 2 * others > len(outlines):
         notes.append(f"nothing tells what {others:,} of them are; import them again with Take All As")
-    return found, system, notes
+    return outlines, system, notes
 
 
 def _rings(geometry: dict[str, Any] | None, where: str) -> Iterator[tuple[tuple[Floats, ...], bool]]:
@@ -163,22 +163,22 @@ def _kind(tags: _Tags, names: tuple[str, ...], closed: bool) -> tuple[str, str]:
 
 def _measured(tags: _Tags, usual: str, keys: re.Pattern) -> float:
     """The first measure under the usual key, or under any whose letters fit."""
-    if found := _measure(tags.get(usual)):
-        return found
+    if meters := _measure(tags.get(usual)):
+        return meters
     for key, value in tags.items():
         plain = re.sub(r"[^a-zäöüß]", "", key)
-        if not key.startswith("roof:") and keys.fullmatch(plain) and (found := _measure(value)):
-            return found * (0.3048 if _FEET.search(plain) else 1.0)
+        if not key.startswith("roof:") and keys.fullmatch(plain) and (meters := _measure(value)):
+            return meters * (0.3048 if _FEET.search(plain) else 1.0)
     return 0.0
 
 
 def _measure(value: Any) -> float:
     """Meters of a width or height, or a number; 0 for what tells none. Maps have texts of all kinds there."""
     text = str(value) if isinstance(value, str | int | float) else ""
-    found = re.match(r"[~≈\s]*(\d+(?:[.,]\d+)?)\s*(m|ft|')?", text)
-    if found is None:
+    match = re.match(r"[~≈\s]*(\d+(?:[.,]\d+)?)\s*(m|ft|')?", text)
+    if match is None:
         return 0.0
-    return float(found[1].replace(",", ".")[:20]) * (0.3048 if found[2] in ("ft", "'") else 1.0)
+    return float(match[1].replace(",", ".")[:20]) * (0.3048 if match[2] in ("ft", "'") else 1.0)
 
 
 def one_ring(rings: tuple[Floats, ...]) -> Floats:

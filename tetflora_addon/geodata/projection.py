@@ -380,15 +380,15 @@ def known_systems() -> dict[int, Definition]:
     """All systems that have an EPSG code here."""
     data = table("systems")
     ellipsoids, shifts = [Ellipsoid(*e) for e in data["ellipsoids"]], [tuple(s) for s in data["shifts"]]
-    found = {}
+    systems = {}
     for method, ellipsoid, shift, meridian, unit, rows in data["systems"]:
-        own = Definition(method, ellipsoids[ellipsoid], shifts[shift], meridian, data["units"][unit])
+        definition = Definition(method, ellipsoids[ellipsoid], shifts[shift], meridian, data["units"][unit])
         for parameters, codes, *run in rows:
             number, step = run or (1, [0.0] * len(parameters))
             for k in range(number):
                 figures = tuple(round(a + k * b, 9) for a, b in zip(parameters, step, strict=True))
-                found.update(dict.fromkeys([epsg + k for epsg in codes], replace(own, parameters=figures)))
-    return found | {epsg: found[flat] for epsg, flat in _HEIGHTS.items()}
+                systems.update(dict.fromkeys([epsg + k for epsg in codes], replace(definition, parameters=figures)))
+    return systems | {epsg: systems[flat] for epsg, flat in _HEIGHTS.items()}
 
 
 def system_of(epsg: int, what: str = "") -> System:
@@ -407,9 +407,9 @@ def system_of(epsg: int, what: str = "") -> System:
     )
 
 
-def chosen_system(epsg: int, own: System, what: str) -> System:
+def chosen_system(epsg: int, system: System, what: str) -> System:
     """The system of what an artist chose, which is an EPSG code, `PLAIN`, or 0 for the file's own."""
-    return System() if epsg == PLAIN else system_of(epsg or own.epsg, what) if epsg or own.epsg > 0 else own
+    return System() if epsg == PLAIN else system_of(epsg or system.epsg, what) if epsg or system.epsg > 0 else system
 
 
 def may_be_degrees(points: ArrayLike) -> bool:
@@ -422,19 +422,19 @@ def code_in(text: str) -> int | None:
     """The EPSG code in a name such as ``urn:ogc:def:crs:EPSG::25832`` or an address; None where there is none."""
     if re.search(r"CRS84h?\b", text):
         return LONGITUDE_LATITUDE
-    found = re.search(r"\bEPSG\b[^\w]{1,2}(?:[\d.]*[:/#])?(?:[a-z]+#)?(\d{4,6})\W*$", text.strip(), re.IGNORECASE)
-    found = found or re.search(r"\bepsg\.xml#(\d{4,6})$|/epsg/(\d{4,6})/?$|\bEPSG:(\d{4,6})\b", text, re.IGNORECASE)
-    return int(next(filter(None, found.groups()))) if found else None
+    match = re.search(r"\bEPSG\b[^\w]{1,2}(?:[\d.]*[:/#])?(?:[a-z]+#)?(\d{4,6})\W*$", text.strip(), re.IGNORECASE)
+    match = match or re.search(r"\bepsg\.xml#(\d{4,6})$|/epsg/(\d{4,6})/?$|\bEPSG:(\d{4,6})\b", text, re.IGNORECASE)
+    return int(next(filter(None, match.groups()))) if match else None
 
 
 def to_degrees(system: System, points: Floats) -> Floats:
     """Longitude and latitude on WGS 84 in degrees, (n, 2), of points (n, 2) in a system that lies on Earth."""
-    points, own = system.unit * np.asarray(points, np.float64), system.definition
-    if own.method == "geo" and not any(own.shift):
+    points, definition = system.unit * np.asarray(points, np.float64), system.definition
+    if definition.method == "geo" and not any(definition.shift):
         return points
-    _, back, meridian = own.ways
+    _, back, meridian = definition.ways
     longitude, latitude = back(*points.T)
-    return np.degrees(np.stack(own.to_wgs84(longitude + np.radians(meridian), latitude), axis=1))
+    return np.degrees(np.stack(definition.to_wgs84(longitude + np.radians(meridian), latitude), axis=1))
 
 
 def from_degrees(system: System, points: Floats) -> Floats:
@@ -442,14 +442,14 @@ def from_degrees(system: System, points: Floats) -> Floats:
 
     What is too far from the system's meridian is nan.
     """
-    points, own = np.asarray(points, np.float64), system.definition
-    if own.method == "geo" and not any(own.shift):
+    points, definition = np.asarray(points, np.float64), system.definition
+    if definition.method == "geo" and not any(definition.shift):
         return points
-    longitude, latitude = own.from_wgs84(*np.radians(points).T)
-    there, _, meridian = own.ways
+    longitude, latitude = definition.from_wgs84(*np.radians(points).T)
+    forward, _, meridian = definition.ways
     off = longitude - np.radians(meridian)
     off = np.where(np.abs(off) <= np.pi, off, (off + np.pi) % (2.0 * np.pi) - np.pi)
-    return np.stack(there(off, latitude), axis=1) / system.unit
+    return np.stack(forward(off, latitude), axis=1) / system.unit
 
 
 def between(points: Floats, source: System, target: System) -> Floats:
@@ -553,9 +553,9 @@ def system_in(text: str) -> System:
     with suppress(ValueError, IndexError, TypeError, OverflowError, RecursionError, ZeroDivisionError):
         if re.search(r"^\s*projection\s", text, re.IGNORECASE):
             return _old(text)
-        found = re.search(r"[A-Z]\w*\s*[\[(]", text, re.IGNORECASE)
-        if found and "," in text:
-            root = _nodes(text[found.start() :])
+        match = re.search(r"[A-Z]\w*\s*[\[(]", text, re.IGNORECASE)
+        if match and "," in text:
+            root = _nodes(text[match.start() :])
             if root is not None:
                 return _well_known(root)
     code = code_in(text)
@@ -617,11 +617,11 @@ def _well_known(node: _Node) -> System:
     given = {}
     for name, *rest in (part[1] for part in conversion[1] if isinstance(part, tuple) and part[0] == "PARAMETER"):
         key = next((key for part, key in _PARAMETERS.items() if re.search(part, _plain(name))), "")
-        own = next((part[1][1] for part in rest[1:] if isinstance(part, tuple) and part[0].endswith("UNIT")), None)
+        factor = next((part[1][1] for part in rest[1:] if isinstance(part, tuple) and part[0].endswith("UNIT")), None)
         if key in ("east", "north"):
-            given[key] = rest[0] * (meters if own is None else own)
+            given[key] = rest[0] * (meters if factor is None else factor)
         else:
-            scale = 1.0 if key == "scale" else angle if own is None else degrees(own)
+            scale = 1.0 if key == "scale" else angle if factor is None else degrees(factor)
             given[key] = rest[0] * (1.0 if isclose(scale, 1.0, rel_tol=1e-6) else scale)
     name = "web" if "pseudo" in _plain(node[1][0]) else method[1][0] if method else ""
     zone = re.search(r"utmzone(\d{1,2})([ns])", _plain(node[1][0]))
@@ -632,8 +632,8 @@ def _well_known(node: _Node) -> System:
 
 def _code(node: _Node) -> int:
     """The EPSG code that a node names; 0 for none."""
-    own = _child(node, "AUTHORITY", "ID")
-    return int(own[1][1]) if own and str(own[1][0]).upper() == "EPSG" else 0
+    authority = _child(node, "AUTHORITY", "ID")
+    return int(authority[1][1]) if authority and str(authority[1][0]).upper() == "EPSG" else 0
 
 
 def _plain(name: Any) -> str:
@@ -692,17 +692,17 @@ def described(method: str, given: Mapping[str, float], datum: Definition) -> Sys
     order = (*_ORDER.get(kind, _ORDER[""]), "east", "north")
     if kind not in METHODS or not all(isfinite(given.get(key, float("nan"))) for key in order):
         return System(unit=datum.unit)
-    own = replace(datum, method=kind, parameters=tuple(float(given[key]) for key in order))
-    own.ways[0](*_SOMEWHERE)  # figures that no map can have are an error, and no system
-    return _system(own)
+    definition = replace(datum, method=kind, parameters=tuple(float(given[key]) for key in order))
+    definition.ways[0](*_SOMEWHERE)  # figures that no map can have are an error, and no system
+    return _system(definition)
 
 
 _SOMEWHERE = (np.array([0.1]), np.array([0.1]))
 
 
-def _system(own: Definition) -> System:
+def _system(definition: Definition) -> System:
     """The system with the same figures that has a code, or one by itself."""
-    return System(code) if (code := _codes().get(_figures(own))) else System(-2, own=own)
+    return System(code) if (code := _codes().get(_figures(definition))) else System(-2, own=definition)
 
 
 @cache
@@ -713,17 +713,17 @@ def _codes() -> dict[Any, int]:
     return {_figures(known_systems()[code]): code for code in reversed(codes)}
 
 
-def _figures(own: Definition) -> tuple:
+def _figures(definition: Definition) -> tuple:
     """Figures of a system, rounded so that the same ones are equal."""
-    shape = round(own.ellipsoid.a, 1), round(own.ellipsoid.inverse, 6)
-    if own.method == "geo":
-        return own.method, *shape, tuple(round(v, 2) for v in own.shift), round(own.meridian, 6)
+    shape = round(definition.ellipsoid.a, 1), round(definition.ellipsoid.inverse, 6)
+    if definition.method == "geo":
+        return definition.method, *shape, tuple(round(v, 2) for v in definition.shift), round(definition.meridian, 6)
     # Datums follow from ellipsoids here: whoever writes the figures of a national map means that map.
-    angles, lengths = own.parameters[:-2], own.parameters[-2:]
-    if own.method in ("lcc2", "aea"):  # of two parallels either may come first
+    angles, lengths = definition.parameters[:-2], definition.parameters[-2:]
+    if definition.method in ("lcc2", "aea"):  # of two parallels either may come first
         angles = *angles[:2], *sorted(angles[2:])
     numbers = (*(round(v, 6) for v in angles), *(round(v, 2) for v in lengths))
-    return own.method, *shape, round(own.meridian, 6), round(own.unit, 7), numbers
+    return definition.method, *shape, round(definition.meridian, 6), round(definition.unit, 7), numbers
 
 
 def utm_zone(zone: int, south: bool) -> dict[str, float]:

@@ -193,11 +193,11 @@ def read_ascii(path: Path) -> Job[Raster]:
         end = content.find(b"\n", start + _PIECE)
         end = len(content) if end < 0 else end + 1
         piece = content[start:end]
-        found = numbers_in(piece, name, line)
-        if done + len(found) > len(values):
+        numbers = numbers_in(piece, name, line)
+        if done + len(numbers) > len(values):
             raise SceneError(f"{name}: more than the {len(values):,} values that its head tells of; get it again")
-        values[done : done + len(found)] = np.clip(found, -_BEYOND, _BEYOND)
-        done, start, line = done + len(found), end, line + piece.count(b"\n")
+        values[done : done + len(numbers)] = np.clip(numbers, -_BEYOND, _BEYOND)
+        done, start, line = done + len(numbers), end, line + piece.count(b"\n")
     if done < len(values):
         raise SceneError(f"{name}: line {line}: it ends after {done:,} of {len(values):,} values; get it again")
     values = without_nodata(values.reshape(height, width), header.get("nodata_value", -9999.0))
@@ -228,9 +228,9 @@ def _ascii_head(header: dict[str, float], name: str) -> tuple[int, int, tuple[fl
 
 def numbers_in(piece: bytes, name: str, line: int) -> Floats:
     """All numbers of some lines; a broken one is told by its line."""
-    found = _split(piece)
-    if found is not None:
-        return found
+    numbers = _split(piece)
+    if numbers is not None:
+        return numbers
     for number, text in enumerate(piece.split(b"\n")):
         if text.strip() and _split(text) is None:
             words = text.decode("latin-1").split()
@@ -274,13 +274,13 @@ def without_nodata(values: NDArray[np.floating], nothing: float | None) -> Float
 def beside(path: Path, *endings: str) -> Path | None:
     """The first file with the name of another and one of some endings, in small or large letters."""
     paths = (path.with_suffix(ending) for small in endings for ending in (small, small.upper()))
-    return next((found for found in paths if found.exists()), None)
+    return next((file for file in paths if file.exists()), None)
 
 
 def system_beside(path: Path) -> System:
     """The system in a file ``.prj`` beside another."""
-    found = beside(path, ".prj")
-    return system_in(read_whole(found, 16 * _SMALL).decode("latin-1")) if found else System()
+    file = beside(path, ".prj")
+    return system_in(read_whole(file, 16 * _SMALL).decode("latin-1")) if file else System()
 
 
 def world_file(path: Path) -> list[Floats]:
@@ -295,17 +295,17 @@ def world_file(path: Path) -> list[Floats]:
     """
     ending = path.suffix.lower()
     endings = f"{ending[:2]}{ending[-1:]}w", f"{ending}w", ".wld"
-    found = beside(path, *endings)
-    if found is None:
+    file = beside(path, *endings)
+    if file is None:
         raise SceneError(
             f"{path.name}: nothing tells where it lies, neither tags nor a world file ({', '.join(endings)}); export "
             "it as GeoTIFF"
         )
-    lines = read_whole(found, _SMALL).decode("latin-1").split()
+    lines = read_whole(file, _SMALL).decode("latin-1").split()
     if len(lines) != 6:
-        raise SceneError(f"{found.name}: {len(lines)} numbers; a world file has six, one on each line; correct it")
+        raise SceneError(f"{file.name}: {len(lines)} numbers; a world file has six, one on each line; correct it")
     numbered = enumerate(lines, 1)
-    a, d, b, e, x, y = (_number(text.replace(",", "."), f"{found.name}: line {number}") for number, text in numbered)
+    a, d, b, e, x, y = (_number(text.replace(",", "."), f"{file.name}: line {number}") for number, text in numbered)
     if not abs(a * e - b * d) > 0.0:
-        raise SceneError(f"{found.name}: line 1: its cells have no size; correct it")
+        raise SceneError(f"{file.name}: line 1: its cells have no size; correct it")
     return [np.array([x, y]), np.array([a, d]), np.array([b, e])]

@@ -90,11 +90,11 @@ def _known() -> _Names:
     """The table, indexed by joined words."""
     data = table("species_names")
     known = _Names({}, {}, {}, {}, {}, {}, {})
-    own = {words_of(name)[0] for names in data["species"].values() for name in names["scientific"]}
+    genera = {words_of(name)[0] for names in data["species"].values() for name in names["scientific"]}
     for family, groups in data["families"].items():
         for kin, genus in names_in(groups):
             key = key_of(genus)
-            match = Match(kin, GENUS if key in own else KIN)
+            match = Match(kin, GENUS if key in genera else KIN)
             known.genera[key] = match
             known.whole.setdefault(key_of(family), Match(kin, KIN))
             for short in _shorter(key) if len(key) >= _LONG else ():
@@ -165,12 +165,12 @@ def best_of(names: Sequence[str], among: Container[str] | None = None) -> tuple[
         Identifiers of species that there are.
     """
     matches = [(match, name) for name in names if (match := species_named(name))]
-    found = [(match, name) for match, name in matches if among is None or match.species in among]
-    for match, name in found:
+    available = [(match, name) for match, name in matches if among is None or match.species in among]
+    for match, name in available:
         ways = [words_of(part) for part in _PARTS.split(name)]
         if any(len(words) > 1 and _scientific(words) for words in ways):
             return match, name
-    return min(found, key=lambda pair: pair[0].certainty, default=(None, names[0] if names else ""))
+    return min(available, key=lambda pair: pair[0].certainty, default=(None, names[0] if names else ""))
 
 
 def _named(words: list[str]) -> Match | None:
@@ -211,9 +211,9 @@ def _common(words: list[str]) -> Match | None:
         begin = begin[1:]
     keys = ["".join(way[:i]) for way in (words, begin) for i in range(len(way), 0, -1)]
     first = next((known.first[key] for key in keys if key in known.first), None)
-    found = first or last if _LINKS.intersection(words) else last or first
-    if found is not None:
-        return found
+    chosen = first or last if _LINKS.intersection(words) else last or first
+    if chosen is not None:
+        return chosen
     for word in reversed(words):
         for start in range(2, len(word) - _LEAST + 1):
             match = known.endings.get(word[start:])

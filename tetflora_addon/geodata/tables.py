@@ -132,11 +132,11 @@ def read_points(path: Path, _skip: bool = False, most: int | None = None, chosen
     name, without = path.name, 0
     points, numbers, rows = [np.zeros((0, 2))], [], []
     for number, feature in enumerate(features[:most], 1):
-        found = _points_of(feature["geometry"], f"{name}: feature {number:,}")
-        without += not len(found)
-        points.append(found)
-        numbers += [number] * len(found)
-        rows += [flat_tags(feature.get("properties") or {})] * len(found)
+        places = _points_of(feature["geometry"], f"{name}: feature {number:,}")
+        without += not len(places)
+        points.append(places)
+        numbers += [number] * len(places)
+        rows += [flat_tags(feature.get("properties") or {})] * len(places)
     titles = dict.fromkeys(title for row in rows for title in row)
     if len(titles) > MAX_COLUMNS:
         raise SceneError(f"{name}: {len(titles):,} kinds of properties; {MAX_COLUMNS} is the limit")
@@ -237,17 +237,17 @@ def _cell(text: str, points: bool) -> Quantity:
     if aside is not None:
         inner, outer = _cell(aside[2], points), _cell(aside[1] + aside[3], points)
         return inner if inner.kind == RANGE or outer.kind in (NOTHING, WORD) else outer
-    found = _SHAPE.fullmatch(text)
-    if found is None:
+    match = _SHAPE.fullmatch(text)
+    if match is None:
         return Quantity(math.nan, kind=WRONG)
-    low, high = _value(found["low"], points), _value(found["high"], points) if found["high"] else math.nan
-    unit = _unit(found["second"] or found["first"])
-    if found["high"] is None:
-        open_ = any(found[mark] for mark in ("less", "more", "plus", "over"))
-        return Quantity(low / 2.0 if found["less"] else low, unit, RANGE if open_ else NUMBER)
-    if found["first"] and not found["sep"]:
+    low, high = _value(match["low"], points), _value(match["high"], points) if match["high"] else math.nan
+    unit = _unit(match["second"] or match["first"])
+    if match["high"] is None:
+        open_ = any(match[mark] for mark in ("less", "more", "plus", "over"))
+        return Quantity(low / 2.0 if match["less"] else low, unit, RANGE if open_ else NUMBER)
+    if match["first"] and not match["sep"]:
         return Quantity(math.nan, kind=WRONG)
-    if found["sep"] in ("/", ";", "+"):  # several stems
+    if match["sep"] in ("/", ";", "+"):  # several stems
         return Quantity(max(low, high), unit)
     return Quantity((low + high) / 2.0, unit, RANGE) if high >= low else Quantity(math.nan, kind=WRONG)
 
@@ -274,25 +274,25 @@ def cells(texts: NDArray[np.str_]) -> tuple[Floats, Floats, Integers]:
     """Numbers (n,), 0 for nothing and nan for what is wrong; meters of their units, 0 if they name none; kinds."""
     distinct, index = np.unique(texts, return_inverse=True)
     points = any("." in text for text in distinct.tolist())
-    found = [
+    quantities = [
         Quantity(float(text)) if _FLOAT.fullmatch(text) else _in_parts(text) or _cell(text, points)
         for text in distinct.tolist()
     ]
-    values, units, kinds = (np.array(column) for column in zip(*found, strict=True))
+    values, units, kinds = (np.array(column) for column in zip(*quantities, strict=True))
     values = np.where(np.isfinite(values), values, np.nan)
     return values[index], units[index].astype(np.float64), kinds[index].astype(np.int64)
 
 
 def _in_parts(text: str) -> Quantity | None:
     """Feet and inches, or degrees, minutes and seconds; None for others."""
-    found = re.fullmatch(r"(\d+)\s*(?:ft|feet|['′])\s*(\d+(?:\.\d+)?)\s*(?:in|inches|\"|″|'')?", text.strip().lower())
-    if found:
-        return Quantity(float(found[1]) + float(found[2]) / 12.0, 0.3048)
-    found = re.fullmatch(_ANGLE, text.strip().upper())
-    if found is None:
+    match = re.fullmatch(r"(\d+)\s*(?:ft|feet|['′])\s*(\d+(?:\.\d+)?)\s*(?:in|inches|\"|″|'')?", text.strip().lower())
+    if match:
+        return Quantity(float(match[1]) + float(match[2]) / 12.0, 0.3048)
+    match = re.fullmatch(_ANGLE, text.strip().upper())
+    if match is None:
         return None
-    value = float(found[2]) + float(found[3]) / 60.0 + float((found[4] or "0").replace(",", ".")) / 3600.0
-    return Quantity(-value if found[1] or found[5] in ("S", "W") else value)
+    value = float(match[2]) + float(match[3]) / 60.0 + float((match[4] or "0").replace(",", ".")) / 3600.0
+    return Quantity(-value if match[1] or match[5] in ("S", "W") else value)
 
 
 _ANGLE = r"(-)?(\d{1,3})\s*[°º]\s*(\d{1,2})\s*['′’]\s*(\d{1,2}(?:[.,]\d+)?)?\s*(?:\"|″|”|'')?\s*([NSEW])?"
@@ -321,8 +321,8 @@ def place_in(text: str) -> tuple[float, float, int]:
             data = bytes.fromhex(text)
             order = "<" if data[0] else ">"
             kind, code = struct.unpack_from(f"{order}2I", data, 1)
-            code, at = (code, 9) if kind & _WITH_CODE else (0, 5)
-            return (*struct.unpack_from(f"{order}2d", data, at), code) if kind & 255 == 1 else (math.nan, math.nan, 0)
+            code, byte = (code, 9) if kind & _WITH_CODE else (0, 5)
+            return (*struct.unpack_from(f"{order}2d", data, byte), code) if kind & 255 == 1 else (math.nan, math.nan, 0)
         if known is not None:
             first = known[2].lstrip("( ").split(")")[0]
             points = [[float(number) for number in point.strip("() ").split()[:2]] for point in first.split(",")]

@@ -127,10 +127,10 @@ def _axes(rows: Table, branches: Branches, ahead: float = 0.0) -> Axes:
         frames[:, s], knots[:, s + 1] = shown, knot
     by_hand = np.flatnonzero(rows["drawn"][branches.row])
     if len(by_hand):
-        own = branches.take(by_hand)
-        knots[by_hand], frames[by_hand], turn = _drawn_axes(rows, own, most)
+        drawn = branches.take(by_hand)
+        knots[by_hand], frames[by_hand], turn = _drawn_axes(rows, drawn, most)
         if windy:
-            leaned_lines = _leaned(rows, own, turn, knots[by_hand], frames[by_hand], ahead)
+            leaned_lines = _leaned(rows, drawn, turn, knots[by_hand], frames[by_hand], ahead)
             knots[by_hand], frames[by_hand], skies[by_hand] = leaned_lines
     return Axes(knots, frames, segments, skies)
 
@@ -203,12 +203,12 @@ def profile(rows: Table, row: NDArray, key: Keys, t: Floats, summed: bool = Fals
         out[hand] = _drawn(rows, row[hand], t[hand])[summed]
     piped = np.flatnonzero(rows["pipe"][row] > 0)
     if len(piped):
-        power, start, own = rows["pipe"][row[piped]], rows["start"][row[piped], 0, 0], t[piped]
+        power, start, place = rows["pipe"][row[piped]], rows["start"][row[piped], 0, 0], t[piped]
         # A tip as thick as the base has nothing to distribute; the limit keeps divisions finite.
         tip = np.minimum(taper[piped], 1 - 1e-6) ** power
-        left, q = tip + (1 - tip) * (1 - np.clip((own - start) / (1 - start), 0, 1)), summed + 1 / power
+        left, q = tip + (1 - tip) * (1 - np.clip((place - start) / (1 - start), 0, 1)), summed + 1 / power
         fallen = (1 - start) * (1 - left**q) / (q * np.maximum(1 - tip, 1e-12))
-        out[piped] = np.minimum(own, start) + fallen if summed else left**q
+        out[piped] = np.minimum(place, start) + fallen if summed else left**q
     flared = np.flatnonzero(rows["flare"][row] > 0)
     if len(flared):
         end = np.minimum(t[flared], FLARE_END) if summed else t[flared]

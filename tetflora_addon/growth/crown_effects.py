@@ -37,12 +37,12 @@ def shaped_trunks(rows: Table, row: Integers, frame: Floats, forms: Floats) -> t
     forms : (n, 6) float64
         Crown shapes.
     """
-    own = np.where((rows["phantom"][row] | (rows["envelope"][row] > 0))[:, None], PLAIN, forms)
+    shapes = np.where((rows["phantom"][row] | (rows["envelope"][row] > 0))[:, None], PLAIN, forms)
     stool = are_stools(rows, row)
-    own[stool, BASE], own[stool, LEAVES] = 0.0, 1.0
-    light = own[:, EAST, None] * frame[:, 0] + own[:, NORTH, None] * frame[:, 1]
-    crown = np.concatenate([own[:, [WIDTH, BASE]], light, own[:, [LEAVES]]], axis=1)
-    return by_component(crown.astype(np.float32)), own[:, THICKNESS]
+    shapes[stool, BASE], shapes[stool, LEAVES] = 0.0, 1.0
+    light = shapes[:, EAST, None] * frame[:, 0] + shapes[:, NORTH, None] * frame[:, 1]
+    crown = np.concatenate([shapes[:, [WIDTH, BASE]], light, shapes[:, [LEAVES]]], axis=1)
+    return by_component(crown.astype(np.float32)), shapes[:, THICKNESS]
 
 
 def are_shaped(rows: Table, branches: Branches) -> bool:
@@ -84,9 +84,9 @@ def bare_part(rows: Table, row: Integers, base: ArrayLike) -> Floats:
 def lateral_fractions(rows: Table, row: Integers, base: ArrayLike) -> Floats:
     """Where laterals of parts of trunks of rows (n,) begin and end among all of them (n, 2), by crown bases (n,)."""
     base = np.minimum(base, first_forks(rows, row) * 0.999)[:, None]
-    own = rows["fraction"][row, LATERAL]
+    ends = rows["fraction"][row, LATERAL]
     # Both are places on the trunk from where its limbs begin; that from the higher place is the smaller fraction.
-    return np.where(base > 0, np.minimum(own, np.clip((rows["part"][row] - base) / (1 - base), 0.0, 1.0)), own)
+    return np.where(base > 0, np.minimum(ends, np.clip((rows["part"][row] - base) / (1 - base), 0.0, 1.0)), ends)
 
 
 def dead_end(rows: Table, row: Integers, base: ArrayLike) -> Floats:

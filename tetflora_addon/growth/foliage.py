@@ -89,12 +89,12 @@ def leaf_sites(
     -------
     position (m, 3), frame (m, 3, 3) of the branch there, and fraction (m,) of its axis
     """
-    at = axis_places(rows, branches, row, owner, t)
-    position, frame = lines.at(owner, at)
+    place = axis_places(rows, branches, row, owner, t)
+    position, frame = lines.at(owner, place)
     shape = rows["envelope"][row]
     if shape.any():
         start = np.take(leaf_start(rows, branches), owner)
-        up = (at - start) / (1.0 - start)
+        up = (place - start) / (1.0 - start)
         width = np.choose(shape, [0.0, 2.0 * np.sqrt(np.clip(up * (1.0 - up), 0.0, None)), 1.0, 1.0 - up, 1.0])
         a, b = uniform(key, Draw.ENVELOPE_ACROSS), uniform(key, Draw.ENVELOPE_AROUND)
         out, turn = np.sqrt(a), 2.0 * np.pi * b
@@ -102,7 +102,7 @@ def leaf_sites(
         y = np.where(shape == BOX, 2.0 * b - 1.0, out * np.sin(turn))
         radius = width * rows["envelope_radius"][row] * np.take(branches.length, owner)
         position = position + (radius * x)[:, None] * frame[:, :, 0] + (radius * y)[:, None] * frame[:, :, 1]
-    return position, frame, at
+    return position, frame, place
 
 
 def _inclined(frame: Floats32, kind: Integers, key: Keys) -> Floats32:
@@ -113,10 +113,10 @@ def _inclined(frame: Floats32, kind: Integers, key: Keys) -> Floats32:
     number = uniform(key, Draw.LEAF_INCLINATION)
     angle = np.arccos(1.0 - number)  # of a sphere
     for name, (a, b) in _COSINES.items():
-        own = kind == LEAF_INCLINATIONS.index(name)
-        if own.any():
+        chosen = kind == LEAF_INCLINATIONS.index(name)
+        if chosen.any():
             below = (2.0 * _TABLE + a * np.sin(2.0 * _TABLE) + 0.5 * b * np.sin(4.0 * _TABLE)) / np.pi
-            angle = np.where(own, np.interp(number, below, _TABLE), angle)
+            angle = np.where(chosen, np.interp(number, below, _TABLE), angle)
     angle = np.where(uniform(key, Draw.LEAF_SIDE) < 0.5, angle, np.pi - angle)
     bearing, twist = (2.0 * np.pi * uniform(key, draw) for draw in (Draw.LEAF_BEARING, Draw.LEAF_TWIST))
     sa, ca, sb, cb, st, ct = (f(v).astype(np.float32) for v in (angle, bearing, twist) for f in (np.sin, np.cos))
@@ -157,8 +157,8 @@ class Leaves(Arrays):
         """As of `Arrays`; what is the same for all stays so."""
         light = self.light if len(self.light) < len(self.key) else self.light[index]
         sky = self.sky if self.sky.ndim == 1 else gathered(self.sky, index)
-        own = (gathered(of, index) for of in (self.branch, self.key, self.position, self.frame, self.size))
-        return type(self)(*own, light, sky, None if self.stages is None else self.stages.take(index))
+        columns = (gathered(of, index) for of in (self.branch, self.key, self.position, self.frame, self.size))
+        return type(self)(*columns, light, sky, None if self.stages is None else self.stages.take(index))
 
 
 def leaf_keys(branches: Branches, owner: Integers, index: Integers) -> Keys:
@@ -253,8 +253,8 @@ def place_leaves(
     row = _rows_of(branches, owner)
     skies = None if lines.skies is None else lines.skies.astype(np.float32)
     light = Axes(lines.knots, lines.frames.astype(np.float32), lines.segments, skies)
-    position, frame, at = leaf_sites(rows, branches, light, row, owner, key, t)
-    sky = light.sky_at(owner, at)
+    position, frame, place = leaf_sites(rows, branches, light, row, owner, key, t)
+    sky = light.sky_at(owner, place)
     frame = leaf_frames(rows, row, frame, np.take(uniform(branches.key, Draw.ROLL), owner), index, key, sky)
     alike = not (rows["gradient"][row].any() or rows["sunlit"][row].any())
     outward = np.zeros(1) if alike else outwardness(rows, branches, owner, t)

@@ -102,9 +102,9 @@ def chosen_drawn(rows: Table, plants: Branches, owner: Integers, index: Integers
     row = (rows["drawn_rows"][plant.row, 0] + index).astype(np.int32)
     length, radius, vigor, outward = rows["size"][row].T
 
-    def begun(at: Branches | Pose) -> tuple[Floats, Floats]:
-        start = np.einsum("nij,nj->ni", at.frame, rows["knots"][row, 0]) * plant.scale[:, None]
-        return at.position + start, at.frame @ rows["frames"][row, 0]
+    def begun(pose: Branches | Pose) -> tuple[Floats, Floats]:
+        start = np.einsum("nij,nj->ni", pose.frame, rows["knots"][row, 0]) * plant.scale[:, None]
+        return pose.position + start, pose.frame @ rows["frames"][row, 0]
 
     position, frame = begun(plant)
     # The drawing is bent when its lines are asked for.
@@ -153,15 +153,15 @@ def living_nodes(rows: Table, branches: Branches, sort: int) -> Grown | None:
     row, key, path = branches.row, branches.key, int(_PATHS[sort])
     if sort == FORK or not rows["growing"][row, sort, table.NOW].any():
         return None
-    own = rows["growing"][row, sort]
-    on = own[:, table.NOW] > 0
-    now, power = (np.where(on, own[:, column], 1.0) for column in (table.NOW, table.POWER))
+    nodes = rows["growing"][row, sort]
+    on = nodes[:, table.NOW] > 0
+    now, power = (np.where(on, nodes[:, column], 1.0) for column in (table.NOW, table.POWER))
     whorl = np.maximum(rows["whorl"][rows["next"][row, sort]], 1)
     wanted = varied(rows["count"][row, sort], key, _COUNT[sort]) * fullness(rows, branches, wood=True) / whorl
     draw = np.zeros(len(row)) if sort == DEAD else signed(key, _START[sort])
     mean, variation = rows["start"][row, sort].T
     start = described = mean + variation * draw
-    last = own[:, table.UNTIL]
+    last = nodes[:, table.UNTIL]
     if crown_effects.are_shaped(rows, branches):
         base = branches.crown[:, BASE]
         bare = crown_effects.bare_part(rows, row, base)
@@ -169,14 +169,14 @@ def living_nodes(rows: Table, branches: Branches, sort: int) -> Grown | None:
             start, wanted = np.maximum(start, bare), wanted * crown_effects.limb_count_factors(rows, row, base)
         elif sort == DEAD:
             last = np.where(last > start, np.maximum(last, bare), last)
-    begin = table.varied_begin(own[:, table.BEGIN], own[:, table.VARIES], draw)
-    whole = wanted * own[:, table.WHOLE]
-    law = NodeLaw(begin, np.maximum(own[:, table.END], begin), power, whole, wanted * own[:, table.BELOW])
+    begin = table.varied_begin(nodes[:, table.BEGIN], nodes[:, table.VARIES], draw)
+    whole = wanted * nodes[:, table.WHOLE]
+    law = NodeLaw(begin, np.maximum(nodes[:, table.END], begin), power, whole, wanted * nodes[:, table.BELOW])
     # Nodes of the full-grown branch are rounded.
     settled, chance = rows["settled"][row], uniform(key, _ROUND[sort])
     rounded = (1 - settled) * whole + settled * np.floor(whole + chance)
-    density = np.where(whole > 0, rounded / np.maximum(whole, 1e-12), 1.0), own[:, table.EXTRA]
-    ends = np.stack([law.number_at(place * now) for place in (start, own[:, table.FRESH], last)])
+    density = np.where(whole > 0, rounded / np.maximum(whole, 1e-12), 1.0), nodes[:, table.EXTRA]
+    ends = np.stack([law.number_at(place * now) for place in (start, nodes[:, table.FRESH], last)])
     ends = np.maximum(ends, ends[0])
 
     def passed(place: Floats, begin: int) -> Integers:
@@ -256,15 +256,15 @@ def chosen_children(
                 start = np.maximum(start, crown_effects.bare_part(rows, parent.row, base))
         t = start + (end - start) * fraction
         if grown is not None:
-            there, part, own = grown.places(owner, node, 0.5 + _PLACE_JITTER * place, extra)
+            along, part, described = grown.places(owner, node, 0.5 + _PLACE_JITTER * place, extra)
             on = grown.on[owner]
-            t, fraction = np.where(on, there, t), np.where(on, part, fraction)
+            t, fraction = np.where(on, along, t), np.where(on, part, fraction)
         among = rows["fraction"][parent.row, sort]
         low, high = (crown_effects.lateral_fractions(rows, parent.row, base) if shaped and sort == LATERAL else among).T
         fraction = low + (high - low) * fraction
         if grown is not None:
             first, last = among.T
-            fading = faded(first + (last - first) * own, rows["growing"][parent.row, sort, table.FADES], extra)
+            fading = faded(first + (last - first) * described, rows["growing"][parent.row, sort, table.FADES], extra)
     position, frame = lines.at(owner, t)
     sky = lines.sky_at(owner, t)
     angle_base, angle_spread = rows["angle"][row].T
@@ -353,9 +353,9 @@ class WholeBranches(Arrays):
         t = knot / np.take(self.lines.segments, owner)
         position = self.lines.knot(owner, knot)
         if rings.any():  # the first segment is cut where the flare bends most
-            at = np.array([0.0, *table.FLARE_RINGS[: int(rings.max())]])
+            fractions = np.array([0.0, *table.FLARE_RINGS[: int(rings.max())]])
             cut = np.flatnonzero((index <= rings[owner]) & (index > 0) & (rings[owner] > 0))
-            t[cut] = at[index[cut]]
+            t[cut] = fractions[index[cut]]
             position[cut] = self.lines.at(owner[cut], t[cut])[0]
         return owner, t, position
 

@@ -150,5 +150,5 @@ def systematic(weights: Floats, group: Integers, sort: Floats, numbers: Integers
     of = np.repeat(np.arange(len(numbers)), numbers)
     place = {number: np.argsort(np.argsort(np.arange(number) * GOLDEN % 1.0)) for number in set(numbers.tolist())}
     fraction = (np.concatenate([place[number] for number in numbers.tolist()]) + 0.5) / numbers[of]
-    at = low[of] + (high - low)[of] * fraction
-    return order[np.minimum(np.searchsorted(edges[1:], at, side="right"), len(order) - 1)]
+    marks = low[of] + (high - low)[of] * fraction
+    return order[np.minimum(np.searchsorted(edges[1:], marks, side="right"), len(order) - 1)]

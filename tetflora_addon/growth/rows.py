@@ -82,22 +82,22 @@ def _grow_children(
     starts = mean + variation * _GAUSS  # numbers are not linear in the start, so that their mean is not that of it
     varies = start[1] / start[0] if start[0] > 0 else 0.0
     begins = varied_begin(begin, varies, _GAUSS)
-    own = NodeLaw(begins, np.maximum(end, begins), power, whole, below)
-    there = _alive(own, (starts, fresh, until), here / full, nodes.extra)
+    part_law = NodeLaw(begins, np.maximum(end, begins), power, whole, below)
+    alive = _alive(part_law, (starts, fresh, until), here / full, nodes.extra)
     row["fraction"][sort] = fraction
-    row["count"][sort] *= there / number
+    row["count"][sort] *= alive / number
     row["start"][sort] = mean, variation
-    if there > 0:
+    if alive > 0:
         row["growing"][sort] = (
-            *(here / full, begin, end, until, power, whole / there, below / there),
+            *(here / full, begin, end, until, power, whole / alive, below / alive),
             *(fresh, nodes.extra, varies, nodes.kept * (1 - nodes.fresh)),
         )
 
 
 def _alive(law: NodeLaw, places: tuple, now: float, extra: float) -> float:
     """Mean number of living nodes, by where they begin, where those that live for a while do, and where they end."""
-    base, some, tip = (law.number_at(place * now) for place in places)
-    return float(_WEIGHTS @ (np.maximum(tip - base, 0) + extra * np.maximum(tip - np.maximum(some, base), 0)))
+    base, fresh, tip = (law.number_at(place * now) for place in places)
+    return float(_WEIGHTS @ (np.maximum(tip - base, 0) + extra * np.maximum(tip - np.maximum(fresh, base), 0)))
 
 
 def living(row: np.void, sort: int, bare: float = 0.0, dead: float | None = None) -> float:
@@ -105,12 +105,12 @@ def living(row: np.void, sort: int, bare: float = 0.0, dead: float | None = None
 
     ``bare`` is where the lowest are at least, by a crown shape; or of dead ones ``dead`` where the topmost are.
     """
-    own, number, (mean, variation) = row["growing"][sort], row["count"][sort, 0], row["start"][sort]
-    begins = varied_begin(own[BEGIN], own[VARIES], _GAUSS)
-    law = NodeLaw(begins, np.maximum(own[END], begins), own[POWER], own[WHOLE] * number, own[BELOW] * number)
+    nodes, number, (mean, variation) = row["growing"][sort], row["count"][sort, 0], row["start"][sort]
+    begins = varied_begin(nodes[BEGIN], nodes[VARIES], _GAUSS)
+    law = NodeLaw(begins, np.maximum(nodes[END], begins), nodes[POWER], nodes[WHOLE] * number, nodes[BELOW] * number)
     starts = np.maximum(mean + (0.0 if dead is not None else variation) * _GAUSS, bare)
-    until = max(own[UNTIL], dead or 0.0) if own[UNTIL] > mean else own[UNTIL]
-    return _alive(law, (starts, own[FRESH], until), own[NOW], own[EXTRA])
+    until = max(nodes[UNTIL], dead or 0.0) if nodes[UNTIL] > mean else nodes[UNTIL]
+    return _alive(law, (starts, nodes[FRESH], until), nodes[NOW], nodes[EXTRA])
 
 
 def varied_begin(begin: ArrayLike, varies: ArrayLike, draw: Floats) -> Floats:
@@ -134,16 +134,16 @@ def spread_children(
     fading : (512,) float64
         Factor on their lengths.
     """
-    own, number = row["growing"][sort], row["count"][sort, 0]
-    law = NodeLaw(own[BEGIN], own[END], own[POWER], own[WHOLE] * number, own[BELOW] * number)
+    nodes, number = row["growing"][sort], row["count"][sort, 0]
+    law = NodeLaw(nodes[BEGIN], nodes[END], nodes[POWER], nodes[WHOLE] * number, nodes[BELOW] * number)
     start = row["start"][sort, 0]
-    until = max(own[UNTIL], dead) if own[UNTIL] > start else own[UNTIL]
-    base, lowest, some, tip = law.number_at(np.array([start, max(start, bare), own[FRESH], until]) * own[NOW])
-    node, weight, extra = some_nodes((lowest, max(some, lowest), tip), own[EXTRA])
+    until = max(nodes[UNTIL], dead) if nodes[UNTIL] > start else nodes[UNTIL]
+    base, lowest, fresh, tip = law.number_at(np.array([start, max(start, bare), nodes[FRESH], until]) * nodes[NOW])
+    node, weight, extra = some_nodes((lowest, max(fresh, lowest), tip), nodes[EXTRA])
     (low, high), described = row["fraction"][sort] if among is None else among, row["fraction"][sort]
     fraction = low + (high - low) * (node - lowest) / max(tip - lowest, 1e-9)
     own_fraction = described[0] + (described[1] - described[0]) * (node - base) / max(tip - base, 1e-9)
-    return np.clip(law.place_of(node) / own[NOW], 0, 1), fraction, weight, faded(own_fraction, own[FADES], extra)
+    return np.clip(law.place_of(node) / nodes[NOW], 0, 1), fraction, weight, faded(own_fraction, nodes[FADES], extra)
 
 
 def lengths(rows: Table, row: Integers, fraction: Floats) -> Floats:
@@ -155,17 +155,17 @@ def lengths(rows: Table, row: Integers, fraction: Floats) -> Floats:
     return out
 
 
-def fullness_of(rows: Table, row: Integers, vigor: Floats, own: Floats | None = None) -> Floats:
+def fullness_of(rows: Table, row: Integers, vigor: Floats, described: Floats | None = None) -> Floats:
     """Factor (n,) on the numbers of branches and leaves on branches of rows (n,) and vigors (n,).
 
-    ``own`` (n,) are their vigors without the crown shapes of their plants.
+    ``described`` (n,) are their vigors without the crown shapes of their plants.
     """
     weight = rows["count_by_length"][row]
     full = 1 - weight + weight * vigor
     least = rows["least"][row]
     if least.any():  # what has just begun to grow bears nothing yet
-        own = vigor if own is None else own
-        full = full * np.where(least > 0, np.clip(own / np.maximum(least, 1e-9), 0, 1), 1.0)
+        described = vigor if described is None else described
+        full = full * np.where(least > 0, np.clip(described / np.maximum(least, 1e-9), 0, 1), 1.0)
     return full
 
 
@@ -207,12 +207,12 @@ class Grown:
 
     def places(self, owner: Integers, node: Integers, within: Floats, extra: Mask) -> tuple[Floats, Floats, Floats]:
         """Fractions (m,) for nodes (m,) of branches (m,): of the branch, of its children, and of those as described."""
-        own = node + within
-        dense = np.where(extra, self.density[1][owner], np.where(own >= 0, self.density[0][owner], 1.0))
-        own = own / np.maximum(dense, 1e-9)
-        t = NodeLaw(*(one[owner] for one in self.law)).place_of(own) / self.now[owner]
+        number = node + within
+        dense = np.where(extra, self.density[1][owner], np.where(number >= 0, self.density[0][owner], 1.0))
+        number = number / np.maximum(dense, 1e-9)
+        t = NodeLaw(*(one[owner] for one in self.law)).place_of(number) / self.now[owner]
         high = self.ends[2][owner]
-        parts = [(own - low) / np.maximum(high - low, 1e-9) for low in (self.ends[0][owner], self.described[owner])]
+        parts = [(number - low) / np.maximum(high - low, 1e-9) for low in (self.ends[0][owner], self.described[owner])]
         return np.clip(t, 0, 1), np.clip(parts[0], 0, 1), np.clip(parts[1], 0, 1)
 
 
@@ -259,8 +259,8 @@ def drawn_lines(branches: DrawnBranches) -> DrawnLines:
     wanted = np.minimum(np.arange(MAX_SEGMENTS + 1) / segments[:, None], 1.0)
     # One rising scale for all branches: that of branch b runs from 2 b to 2 b + 1.
     place = 2 * branches.owner + branches.arc / np.maximum(branches.length, 1e-300)[branches.owner]
-    at = (2 * np.arange(number)[:, None] + wanted).ravel()
-    values = [np.interp(at, place, v).reshape(number, -1) for v in (*branches.knots.T, branches.radius)]
+    marks = (2 * np.arange(number)[:, None] + wanted).ravel()
+    values = [np.interp(marks, place, v).reshape(number, -1) for v in (*branches.knots.T, branches.radius)]
     knots, radii = np.stack(values[:3], axis=-1), np.maximum(values[3], 1e-6)
     chords = np.linalg.norm(np.diff(knots, axis=1), axis=2).sum(axis=1)
     order, outward = branches.order.astype(np.int64), np.asarray(branches.outward, dtype=np.float64)
@@ -482,18 +482,18 @@ def _row(order: Order, species: int, number: int) -> np.void:
 
 def _grow(row: np.void, order: Order, p: int, dead: Dead | None) -> None:
     """Where children of a part are, number ``p`` of an order that is not full-grown."""
-    own, cuts = order.growing, whole_cuts(order)
-    row["settled"], row["conical"], row["ramps"] = own.settled, own.conical, own.ramps
-    sorts = [(LATERAL, own.laterals, order.branches, order.branch_start)]
-    sorts += [(SPUR, own.spurs, order.spurs, order.spur_start)]
+    growing, cuts = order.growing, whole_cuts(order)
+    row["settled"], row["conical"], row["ramps"] = growing.settled, growing.conical, growing.ramps
+    sorts = [(LATERAL, growing.laterals, order.branches, order.branch_start)]
+    sorts += [(SPUR, growing.spurs, order.spurs, order.spur_start)]
     if dead is not None and row["next"][DEAD] >= 0:
         low, high = dead.part(order.branch_start.mean)
-        nodes = own.dead._replace(until=high)
+        nodes = growing.dead._replace(until=high)
         sorts += [(DEAD, nodes, dead.on_limbs if row["order"] else dead.number, Range(low))]
     for sort, nodes, number, start in sorts:
         if row["next"][sort] >= 0:
             row["count"][sort] = number
-            _grow_children(row, sort, nodes, start, own.now, cuts, p)
+            _grow_children(row, sort, nodes, start, growing.now, cuts, p)
             if sort == DEAD:
                 row["start"][DEAD, 1] = max(row["start"][DEAD, 0], row["growing"][DEAD, UNTIL])
 
@@ -568,10 +568,10 @@ def _flare_rings(row: np.void) -> int:
 def _pipe_radius(row: np.void, thickest: float) -> float:
     """Radius of a lateral of vigor 1 such that all together have what the taper takes away, in r^p."""
     low, high = row["fraction"][LATERAL]
-    at, weight, fading = low + (high - low) * EVEN, 1.0, 1.0
+    fraction, weight, fading = low + (high - low) * EVEN, 1.0, 1.0
     if row["growing"][LATERAL, NOW] > 0:
-        _, at, weight, fading = spread_children(row, LATERAL)
-    vigor = lengths(row[None], np.zeros(at.shape, np.int64), at) * fading
+        _, fraction, weight, fading = spread_children(row, LATERAL)
+    vigor = lengths(row[None], np.zeros(fraction.shape, np.int64), fraction) * fading
     lost = 1 - row["taper"][0] ** row["pipe"]
     number = max(row["count"][LATERAL, 0], 1.0) * (weight * vigor ** row["pipe"]).mean()
     return min((lost / max(number, 1e-12)) ** (1 / row["pipe"]), 1 / max(thickest, 1e-9))
@@ -585,9 +585,9 @@ def without_variation(species: Species) -> Species:
     return replace(species, orders=orders, spur=None if species.spur is None else _exact(species.spur), dead=dead)
 
 
-def _exact(some: Order | Dead) -> Order | Dead:
-    still = {name: Range(value.mean) for name, value in vars(some).items() if isinstance(value, Range)}
-    return replace(some, **still)
+def _exact(order: Order | Dead) -> Order | Dead:
+    still = {name: Range(value.mean) for name, value in vars(order).items() if isinstance(value, Range)}
+    return replace(order, **still)
 
 
 def ranged(rows: Table, name: str, row: Integers, key: Keys, draw: int) -> NDArray:

@@ -115,18 +115,18 @@ def seasonal_rows(rows: Table, species: Sequence[Species], season: Season) -> Ta
     out["day"] = season.northern_day
     out["year"]["turnover"] = 0.0
     for number, one in enumerate(species):
-        own = rows["species"] == number
+        chosen = rows["species"] == number
         if one.year is None:
             continue
         year = one.year.at_latitude(abs(season.latitude))
         first = year.leaf or year.blossom
-        out["middle"][own] = first.middle % DAYS if first is not None else 0.0
-        out["spring"][own], out["autumn"][own] = season.spread * year.spring, season.spread * year.autumn
+        out["middle"][chosen] = first.middle % DAYS if first is not None else 0.0
+        out["spring"][chosen], out["autumn"][chosen] = season.spread * year.spring, season.spread * year.autumn
         for kind in range(len(LEAF_KINDS)):
             leaf = year.of_kind(kind)
             if leaf is not None:
-                out["year"][own & (rows["leaf_kind"] == kind)] = _numbers(leaf)
-                out["follows"][own & (rows["leaf_kind"] == kind)] = True
+                out["year"][chosen & (rows["leaf_kind"] == kind)] = _numbers(leaf)
+                out["follows"][chosen & (rows["leaf_kind"] == kind)] = True
     return out
 
 
@@ -170,12 +170,12 @@ def plant_years(rows: Table, row: Integers, key: Keys) -> Floats | None:
 
 def may_change(rows: Table, row: Integers, year: Floats) -> bool:
     """Whether some leaves on rows (n,) or (1,), of plants with years (n, 2), may not be as in summer."""
-    own = rows["year"][row]
-    day = (year[:, 0] - own["origin"]) % DAYS
+    leaf = rows["year"][row]
+    day = (year[:, 0] - leaf["origin"]) % DAYS
     most = _DEVIATIONS[-1]
-    growing = np.where(own["any_fresh"], _FRESH, 1.0) * own["growth"]
-    new = day < own["appear"] + most * own["appear_spread"] + growing
-    old = day > own["turn"] - most * own["turn_spread"] - np.maximum(own["turning"] / 2, -own["fall"])
+    growing = np.where(leaf["any_fresh"], _FRESH, 1.0) * leaf["growth"]
+    new = day < leaf["appear"] + most * leaf["appear_spread"] + growing
+    old = day > leaf["turn"] - most * leaf["turn_spread"] - np.maximum(leaf["turning"] / 2, -leaf["fall"])
     return bool((rows["follows"][row] & (new | old)).any())
 
 
@@ -206,10 +206,10 @@ def leaf_stages(rows: Table, row: Integers, key: Keys, day: Floats) -> Stages:
     chance = (place[3] + 0.5) / (1 << _BITS)
     follows = chance < year["turnover"]
     alive = arrived & hangs
-    there = alive | ~follows | (chance < year["turnover"] * year["kept"])
+    present = alive | ~follows | (chance < year["turnover"] * year["kept"])
     live = alive & follows
     size, fresh, turned = (np.where(live, of, other) for of, other in ((size, 1.0), (fresh, 0.0), (turned, 0.0)))
-    return Stages(there, size, fresh, turned, (follows & ~alive).astype(np.float64), tint)
+    return Stages(present, size, fresh, turned, (follows & ~alive).astype(np.float64), tint)
 
 
 def _springtime(year: np.void | Table, day: Floats, deviation: Floats) -> tuple[Mask, Floats, Floats]:
@@ -237,9 +237,9 @@ def leaf_table(leaf: LeafYear | None) -> Floats:
     if leaf is None:
         return np.repeat([[1.0], [1.0], [1.0], [0.0], [0.0], [0.0]], len(days), axis=1)
     year = _numbers(leaf)
-    some = _DEVIATIONS.reshape(_NODES, -1).mean(axis=1)
+    deviations = _DEVIATIONS.reshape(_NODES, -1).mean(axis=1)
     arrived, size, fresh = _springtime(year, days[:, None], _DEVIATIONS.reshape(8 * _NODES, -1).mean(axis=1))
-    hangs, turned = _autumntime(year, days[:, None, None], some[:, None], some)
+    hangs, turned = _autumntime(year, days[:, None, None], deviations[:, None], deviations)
     number, lengths, area, young = ((arrived * v).mean(axis=1) for v in (1.0, size, size**2, size**2 * fresh))
     held, colored = hangs.mean(axis=(1, 2)), (hangs * turned).mean(axis=(1, 2))
     gone = leaf.kept * (1.0 - number * held)  # and hangs on

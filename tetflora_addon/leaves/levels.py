@@ -77,9 +77,9 @@ def surface_of(shape: Shape, tolerance: float, amount: float = 1.0, factor: floa
     return blade_surface(shape, tolerance / (1.0 - shape.petiole), amount)
 
 
-def shown_area(shape: Shape, made: LeafSurface) -> float:
+def shown_area(shape: Shape, leaf: LeafSurface) -> float:
     """One-sided area of flat leaves that would show as much as polygons of a shape: needles hide each other."""
-    return 2.0 * mean_silhouette(_model_of(made)) if isinstance(shape, Needles) else float(made.areas().mean())
+    return 2.0 * mean_silhouette(_model_of(leaf)) if isinstance(shape, Needles) else float(leaf.areas().mean())
 
 
 def fitted(shape: Shape, tolerance: float, area: float, reach: float = np.inf, amount: float = 1.0) -> LeafSurface:
@@ -88,28 +88,28 @@ def fitted(shape: Shape, tolerance: float, area: float, reach: float = np.inf, a
     None reaches farther than the model. All variants of blades and compound leaves have that area, as these become
     wider or narrower. Needles hide each other: they become thicker until they show as much, turned all ways.
     """
-    made = surface_of(shape, tolerance, amount)
-    smaller = min(reach / float(np.linalg.norm(made.positions, axis=2).max()), 1.0)
+    leaf = surface_of(shape, tolerance, amount)
+    smaller = min(reach / float(np.linalg.norm(leaf.positions, axis=2).max()), 1.0)
     factor, growth = 1.0, _GROWTH
     if isinstance(shape, Needles):
-        shown = np.log(shown_area(shape, made))
+        shown = np.log(shown_area(shape, leaf))
         for _ in range(_FITS):
             step = (np.log(area / smaller**2) - shown) / growth
             step = float(np.clip(step, np.log(_THINNEST / factor), np.log(_THICKEST / factor)))
             factor *= np.exp(step)
-            made, before = surface_of(shape, tolerance, amount, factor), shown
-            shown = np.log(shown_area(shape, made))
+            leaf, before = surface_of(shape, tolerance, amount, factor), shown
+            shown = np.log(shown_area(shape, leaf))
             growth = float(np.clip((shown - before) / step, 0.3, 1.0)) if abs(step) > _FITTED else growth
     elif isinstance(shape, Compound):  # the surface grows with the width almost evenly
-        mean, wide = made.areas().mean(), surface_of(shape, tolerance, amount, _WIDER).areas().mean()
+        mean, wide = leaf.areas().mean(), surface_of(shape, tolerance, amount, _WIDER).areas().mean()
         factor += (_WIDER - 1.0) * float((area / smaller**2 - mean) / (wide - mean))
-        made = surface_of(shape, tolerance, amount, min(max(factor, _THINNEST), _THICKEST))
-    made = replace(made, positions=made.positions * smaller, error=made.error * smaller)
+        leaf = surface_of(shape, tolerance, amount, min(max(factor, _THINNEST), _THICKEST))
+    leaf = replace(leaf, positions=leaf.positions * smaller, error=leaf.error * smaller)
     if not isinstance(shape, Needles):
-        made = made.widened_to(area)
+        leaf = leaf.widened_to(area)
     turn = np.radians(shape.turn)
     frame = np.array([[np.cos(turn), 0.0, np.sin(turn)], [0.0, 1.0, 0.0], [-np.sin(turn), 0.0, np.cos(turn)]])
-    return made.moved(frame, np.zeros(3)) if shape.turn else made
+    return leaf.moved(frame, np.zeros(3)) if shape.turn else leaf
 
 
 class _Finer:
@@ -148,28 +148,28 @@ def _each_level(model: LeafModel) -> Iterator[LeafLevel]:
     """Levels of a model that has a shape, each worth while for its error."""
     shape, error = model.shape, coarse_error(model)
     for tolerance in (2.0 * SPARSE, *TOLERANCES) if isinstance(shape, Needles) else TOLERANCES:
-        made = fitted(shape, tolerance, model.area, model.reach)
-        if made.error > _FINER * error:
+        leaf = fitted(shape, tolerance, model.area, model.reach)
+        if leaf.error > _FINER * error:
             continue
-        if made.polygons > MOST_POLYGONS:
+        if leaf.polygons > MOST_POLYGONS:
             break
-        stem = _stems(made)
+        stem = _stems(leaf)
         tint = np.where(stem[:, None], _TINTS[isinstance(shape, Needles)], 1.0).astype(np.float32)
-        again = np.where(stem, 0.0, _recollision(shape, made)).astype(np.float32)
+        again = np.where(stem, 0.0, _recollision(shape, leaf)).astype(np.float32)
         solid = isinstance(shape, Needles) and tolerance <= FLAT
-        yield LeafLevel(_model_of(made), made.positions.astype(np.float32), made.error, tint, again, solid)
-        error = made.error
+        yield LeafLevel(_model_of(leaf), leaf.positions.astype(np.float32), leaf.error, tint, again, solid)
+        error = leaf.error
 
 
-def _stems(made: LeafSurface) -> Mask:
+def _stems(leaf: LeafSurface) -> Mask:
     """Which faces (f,) of a surface are stems."""
-    first = made.face_offsets[:-1]
-    return (made.uv[first, 1] < -_STEM) | (made.uv[first + 1, 1] < -_STEM)
+    first = leaf.face_offsets[:-1]
+    return (leaf.uv[first, 1] < -_STEM) | (leaf.uv[first + 1, 1] < -_STEM)
 
 
-def _recollision(shape: Shape, made: LeafSurface) -> float:
+def _recollision(shape: Shape, leaf: LeafSurface) -> float:
     """Probability that light which one of the polygons of a shape scatters meets another."""
-    return max(1.0 - shown_area(shape, made) / float(made.areas().mean()), 0.0)
+    return max(1.0 - shown_area(shape, leaf) / float(leaf.areas().mean()), 0.0)
 
 
 @lru_cache(maxsize=128)
@@ -180,9 +180,9 @@ def needle_ratio(model: LeafModel) -> float:
     """
     if not isinstance(model.shape, Needles):
         return 1.0
-    made = fitted(model.shape, TOLERANCES[-1], model.area, model.reach)
-    faces = np.linalg.norm(_model_of(made).face_vectors, axis=1) * np.where(made.solid, 0.5, 1.0)
-    return 1.0 if _recollision(model.shape, made) > _SCALES else float(faces[~_stems(made)].sum()) / model.area
+    leaf = fitted(model.shape, TOLERANCES[-1], model.area, model.reach)
+    faces = np.linalg.norm(_model_of(leaf).face_vectors, axis=1) * np.where(leaf.solid, 0.5, 1.0)
+    return 1.0 if _recollision(model.shape, leaf) > _SCALES else float(faces[~_stems(leaf)].sum()) / model.area
 
 
 @lru_cache(maxsize=128)
@@ -240,8 +240,8 @@ def coarse_error(model: LeafModel) -> float:
         return rounded(model, 0)[1] if _is_round(model) else 0.0
     if isinstance(model.shape, Needles):
         return max(6.0 * model.shape.gap, 0.03)
-    made = fitted(model.shape, TOLERANCES[2], model.area, model.reach, amount=0.0)
-    fine, coarse = _margin(_model_of(made), not isinstance(model.shape, Compound)), _margin(model, stems=True)
+    leaf = fitted(model.shape, TOLERANCES[2], model.area, model.reach, amount=0.0)
+    fine, coarse = _margin(_model_of(leaf), not isinstance(model.shape, Compound)), _margin(model, stems=True)
     inside = _farthest(fine, coarse)
     if isinstance(model.shape, Compound) and model.shape.pairs > 1:
         # Leaflets that close up are one surface until the gaps between them can be seen, however deep these are.
@@ -251,18 +251,18 @@ def coarse_error(model: LeafModel) -> float:
 
 def _round_levels(model: LeafModel) -> tuple[LeafLevel, ...]:
     """Levels of a model with closed parts, which become rounder."""
-    found: list[LeafLevel] = []
+    levels: list[LeafLevel] = []
     for times in range(1, _ROUNDEST if _is_round(model) else 1):
-        made, error = rounded(model, times)
-        if made.polygons > MOST_POLYGONS:
+        body, error = rounded(model, times)
+        if body.polygons > MOST_POLYGONS:
             break
-        tint, again = np.ones((made.polygons, 3), np.float32), np.zeros(made.polygons, np.float32)
-        found.append(LeafLevel(made, made.positions[None].astype(np.float32), error, tint, again))
-    if found and model.spines is not None:  # only up close: before, they are much thinner than pixels
-        made, tint = spined(found[-1].model, model.spines, closed_parts(found[-1].model))
-        again, shapes = np.zeros(made.polygons, np.float32), made.positions[None].astype(np.float32)
-        found[-1] = replace(found[-1], model=made, shapes=shapes, tint=tint, again=again)
-    return tuple(found)
+        tint, again = np.ones((body.polygons, 3), np.float32), np.zeros(body.polygons, np.float32)
+        levels.append(LeafLevel(body, body.positions[None].astype(np.float32), error, tint, again))
+    if levels and model.spines is not None:  # only up close: before, they are much thinner than pixels
+        body, tint = spined(levels[-1].model, model.spines, closed_parts(levels[-1].model))
+        again, shapes = np.zeros(body.polygons, np.float32), body.positions[None].astype(np.float32)
+        levels[-1] = replace(levels[-1], model=body, shapes=shapes, tint=tint, again=again)
+    return tuple(levels)
 
 
 def _is_round(model: LeafModel) -> bool:
@@ -290,9 +290,9 @@ def _farthest(one: Floats, other: Floats) -> float:
     return float(np.concatenate(off).max())
 
 
-def _model_of(made: LeafSurface) -> LeafModel:
+def _model_of(leaf: LeafSurface) -> LeafModel:
     """A model of the first variant of a surface."""
-    return LeafModel(made.positions[0], made.corner_verts, made.face_offsets, made.uv.astype(np.float32))
+    return LeafModel(leaf.positions[0], leaf.corner_verts, leaf.face_offsets, leaf.uv.astype(np.float32))
 
 
 #: The topology of all of them.
@@ -327,14 +327,14 @@ class LeafKites:
 @lru_cache(maxsize=256)
 def leaf_kites(model: LeafModel) -> LeafKites:
     """The kites of a leaf model."""
-    found = _planes_of(model)
+    planes = _planes_of(model)
     fan = _fan(model)
-    areas = np.array([one.area for one in found])
+    areas = np.array([one.area for one in planes])
     # A face that is not flat counts as it is drawn.
-    whole = float(fan[1].sum()) if found[0].fold is not None else model.shown_area
-    positions = np.array([_kite(model, whole, one.normal, fan, one.fold or 0.0) for one in found])
+    whole = float(fan[1].sum()) if planes[0].fold is not None else model.shown_area
+    positions = np.array([_kite(model, whole, one.normal, fan, one.fold or 0.0) for one in planes])
     share = np.cumsum(areas) / areas.sum()
-    return LeafKites(positions, _texture(model, positions), share, _materials_of(model, found))
+    return LeafKites(positions, _texture(model, positions), share, _materials_of(model, planes))
 
 
 @lru_cache(maxsize=256)
@@ -342,15 +342,15 @@ def leaf_planes(model: LeafModel) -> LeafModel:
     """A kite for each plane of a leaf model, where it is and as large as it shows; the model where it is as simple."""
     if model.polygons <= 2 * _PLANES and model.triangles <= 2 * model.polygons:
         return model
-    found, (points, areas), (face, _) = _planes_of(model), _fan(model), fans(model)
-    whole, positions = sum(one.area for one in found), []
-    for one in found:
+    planes, (points, areas), (face, _) = _planes_of(model), _fan(model), fans(model)
+    whole, positions = sum(one.area for one in planes), []
+    for one in planes:
         fan = np.isin(face, one.faces)
         area = model.shown_area * one.area / whole
         positions.append(_kite(model, area, one.normal, (points[fan], areas[fan]), one.fold or 0.0))
     corners = np.array(positions)
-    made = leaf_model(corners.reshape(-1, 3), np.arange(4 * len(found)).reshape(-1, 4).tolist())
-    return replace(made, uv=_texture(model, corners).reshape(-1, 2), material_index=_materials_of(model, found))
+    kites = leaf_model(corners.reshape(-1, 3), np.arange(4 * len(planes)).reshape(-1, 4).tolist())
+    return replace(kites, uv=_texture(model, corners).reshape(-1, 2), material_index=_materials_of(model, planes))
 
 
 @dataclass(frozen=True)
@@ -371,21 +371,21 @@ def _planes_of(model: LeafModel) -> list[_Plane]:
     normals = vectors / np.maximum(areas, 1e-300)[:, None]
     materials = np.zeros(len(areas), np.int32) if model.material_index is None else model.material_index
     normal, fold, off = _sheet(*_fan(model))
-    found = []
+    planes = []
     for material in np.unique(materials):
-        own = np.flatnonzero((materials == material) & (areas > 0))
-        if off < _FOLDED_ONCE and len(own) == len(areas):
-            return [_Plane(own, float(areas.sum()), normal, int(material), fold)]
-        for plane in _planes(normals[own], areas[own]):
-            turned, size = normals[own][plane], areas[own][plane]
+        faces = np.flatnonzero((materials == material) & (areas > 0))
+        if off < _FOLDED_ONCE and len(faces) == len(areas):
+            return [_Plane(faces, float(areas.sum()), normal, int(material), fold)]
+        for plane in _planes(normals[faces], areas[faces]):
+            turned, size = normals[faces][plane], areas[faces][plane]
             normal = np.linalg.eigh(np.einsum("f,fi,fj->ij", size, turned, turned))[1][:, 2]
             normal = normal if (size * (turned @ normal)).sum() >= 0.0 else -normal  # to the side of most of them
-            found.append(_Plane(own[plane], float(size.sum()), normal, int(material)))
-    return found
+            planes.append(_Plane(faces[plane], float(size.sum()), normal, int(material)))
+    return planes
 
 
-def _materials_of(model: LeafModel, found: list[_Plane]) -> Integers32 | None:
-    return None if model.material_index is None else np.array([one.material for one in found], np.int32)
+def _materials_of(model: LeafModel, planes: list[_Plane]) -> Integers32 | None:
+    return None if model.material_index is None else np.array([one.material for one in planes], np.int32)
 
 
 def _planes(normals: Floats, areas: Floats) -> list[Integers]:

@@ -109,8 +109,8 @@ class LeafModel:
     @cached_property
     def face_vectors(self) -> Floats:
         """(f, 3) float64: area vector (normal times area) of each face, by Newell's formula."""
-        here, there = self.positions[self.corner_verts], self.positions[self.corner_verts[self.next_corner]]
-        return 0.5 * np.add.reduceat(np.cross(here, there), self.face_offsets[:-1], axis=0)
+        here, following = self.positions[self.corner_verts], self.positions[self.corner_verts[self.next_corner]]
+        return 0.5 * np.add.reduceat(np.cross(here, following), self.face_offsets[:-1], axis=0)
 
     @cached_property
     def area(self) -> float:
@@ -254,8 +254,8 @@ OUTLINES: dict[str, type] = {"blade": Blade, "needles": Needles, "compound": Com
 
 
 def _outline(page: dict[str, Any]) -> Blade | Needles | Compound:
-    own = {key: _outline(value) if key == "leaflet" else value for key, value in page.items() if key != "kind"}
-    return OUTLINES[page["kind"]](**own)
+    fields = {key: _outline(value) if key == "leaflet" else value for key, value in page.items() if key != "kind"}
+    return OUTLINES[page["kind"]](**fields)
 
 
 _PAGES: dict[str, dict[str, Any]] = beside(__file__, "models.json")
@@ -383,9 +383,9 @@ def _areas(points: NDArray, corners: NDArray, part: NDArray, count: int | None =
 
 def _middles(points: Floats, part: Integers) -> Floats:
     """Mean place (count, 3) of the vertices of each closed part, by its number."""
-    own = np.flatnonzero(part >= 0)
-    number = np.maximum(np.bincount(part[own]), 1)
-    return np.stack([np.bincount(part[own], axis[own]) for axis in points.T], axis=1) / number[:, None]
+    vertices = np.flatnonzero(part >= 0)
+    number = np.maximum(np.bincount(part[vertices]), 1)
+    return np.stack([np.bincount(part[vertices], axis[vertices]) for axis in points.T], axis=1) / number[:, None]
 
 
 #: What the color of the leaf is times that of spines, straw on green, and of the felt on areoles.
@@ -424,12 +424,12 @@ def spined(model: LeafModel, spines: Spines, part: Integers) -> tuple[LeafModel,
     root, across = place[owner], perpendicular(along)
     axes = across, np.cross(along, across)
     needles = _pyramids(root, root + length[:, None] * along, *axes, spines.thickness / 2, _EDGES)
-    made, tints = model, [np.ones((model.polygons, 3))]
+    whole, tints = model, [np.ones((model.polygons, 3))]
     for points, color in ((felt, _FELT), (needles, _SPINE)):
         far = np.linalg.norm(points, axis=-1, keepdims=True)  # none reaches farther than the model, as bounds know it
-        made = _with_triangles(made, points * np.minimum(model.reach / np.maximum(far, 1e-300), 1.0))
+        whole = _with_triangles(whole, points * np.minimum(model.reach / np.maximum(far, 1e-300), 1.0))
         tints.append(np.tile(color, (len(points), 1)))
-    return made, np.concatenate(tints).astype(np.float32)
+    return whole, np.concatenate(tints).astype(np.float32)
 
 
 def _areoles(body: LeafModel, part: Integers, distance: float) -> tuple[Floats, Floats]:
@@ -438,15 +438,15 @@ def _areoles(body: LeafModel, part: Integers, distance: float) -> tuple[Floats, 
     corners = np.add.reduceat(body.positions[body.corner_verts], body.face_offsets[:-1])
     middle = corners / np.diff(body.face_offsets)[:, None]
     area = np.linalg.norm(body.face_vectors, axis=1)
-    own = np.flatnonzero((part >= 0) & (area > 0) & (body.positions[first, 1] > _BARE))
+    faces = np.flatnonzero((part >= 0) & (area > 0) & (body.positions[first, 1] > _BARE))
     # From face to face far away from it, so that places are dense soon; each takes those around it away.
-    own = own[np.argsort(0.6180339887 * np.arange(len(own)) % 1.0)]
+    faces = faces[np.argsort(0.6180339887 * np.arange(len(faces)) % 1.0)]
     chosen: list[int] = []
-    free = np.ones(len(own), bool)
+    free = np.ones(len(faces), bool)
     while free.any():
         one = int(np.argmax(free))
-        chosen.append(int(own[one]))
-        free &= np.linalg.norm(middle[own] - middle[own[one]], axis=1) >= distance
+        chosen.append(int(faces[one]))
+        free &= np.linalg.norm(middle[faces] - middle[faces[one]], axis=1) >= distance
     return middle[chosen], body.face_vectors[chosen] / area[chosen, None]
 
 

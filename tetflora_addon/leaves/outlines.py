@@ -80,7 +80,7 @@ class Blade:
 
     def knots(self, side: int) -> Floats:
         """Parameters (n,) of one half's tips, notches and ends, in order; between them it is smooth."""
-        found = [np.linspace(0.0, 1.0, _START)]
+        knots = [np.linspace(0.0, 1.0, _START)]
         if self.teeth:
             steps = np.arange(self.teeth)[:, None]
             within = np.array([0.0, self._rise])
@@ -90,15 +90,15 @@ class Blade:
             elif self.tooth != "serrate":
                 within = np.arange(4) / 4
             y = ((steps + within) / self.teeth).ravel()
-            found.append(y if self.palmate else np.arccos(np.clip(1.0 - 2.0 * y, -1.0, 1.0)) / np.pi)
+            knots.append(y if self.palmate else np.arccos(np.clip(1.0 - 2.0 * y, -1.0, 1.0)) / np.pi)
         if self.palmate and self.lobes:
             tips, _ = self._palm()
-            found.append(1.0 - np.concatenate([tips, (tips[1:] + tips[:-1]) / 2]) / self._most_angle())
+            knots.append(1.0 - np.concatenate([tips, (tips[1:] + tips[:-1]) / 2]) / self._most_angle())
         elif self.lobes:
             fine = np.linspace(0.0, 1.0, 2049)
             phase = self._lobe_phase(self._height(fine), side)
-            found.append(np.interp(np.arange(2, 2 * self.lobes + 2) / 2, phase, fine))
-        every = np.sort(np.clip(np.concatenate(found), 0.0, 1.0))
+            knots.append(np.interp(np.arange(2, 2 * self.lobes + 2) / 2, phase, fine))
+        every = np.sort(np.clip(np.concatenate(knots), 0.0, 1.0))
         return every[np.diff(every, prepend=-1.0) > 1e-9]
 
     def feet(self, s: Floats) -> Floats:

@@ -70,14 +70,14 @@ def _read_leaf(reader: FileReader, data: Any, where: str) -> LeafModel | str:
         if key in data and not _is_list_of_points(data[key], form.count(",") + 1):
             raise reader.fail(f"{where}.{key}", f"must be a list of {form} numbers")
     try:
-        made = leaf_model(data["vertices"], faces, data.get("uv"))
+        model = leaf_model(data["vertices"], faces, data.get("uv"))
     except SpeciesError as error:
         raise reader.fail(where, str(error)) from None
     if "spines" not in data:
-        return made
-    if not (closed_parts(made) >= 0).any():
+        return model
+    if not (closed_parts(model) >= 0).any():
         raise reader.fail(f"{where}.spines", "must be left out, because the polygons have no closed part to stand on")
-    return replace(made, spines=reader.read(Spines, data["spines"], f"{where}.spines"))
+    return replace(model, spines=reader.read(Spines, data["spines"], f"{where}.spines"))
 
 
 def _is_list_of_points(value: Any, size: int) -> bool:
@@ -97,28 +97,28 @@ def _read_outline(reader: FileReader, data: Any, where: str) -> Blade | Needles 
         kind = reader.choice(data["kind"], f"{where}.kind", tuple(OUTLINES))
     rest = {key: value for key, value in data.items() if key != "kind"} if isinstance(data, dict) else data
     readers = {"leaflet": lambda value, path: _read_leaflet(reader, value, path)} if kind == "compound" else {}
-    made = reader.read(OUTLINES[kind], rest, where, readers)
-    if isinstance(made, Blade):
-        if made.palmate and 0 < made.lobes < 3:
-            raise reader.fail(f"{where}.lobes", f"must be 0, or 3 to 12 with palmate lobes, not {made.lobes}")
+    shape = reader.read(OUTLINES[kind], rest, where, readers)
+    if isinstance(shape, Blade):
+        if shape.palmate and 0 < shape.lobes < 3:
+            raise reader.fail(f"{where}.lobes", f"must be 0, or 3 to 12 with palmate lobes, not {shape.lobes}")
         try:
-            check_outline(made)
+            check_outline(shape)
         except SpeciesError as error:
             raise reader.fail(where, str(error)) from None
-    if isinstance(made, Compound) and not (made.pairs or made.around or made.terminal):
+    if isinstance(shape, Compound) and not (shape.pairs or shape.around or shape.terminal):
         raise reader.fail(f"{where}.pairs", "must be at least 1 where there are no leaflets around and no terminal one")
-    return made
+    return shape
 
 
 def _read_leaflet(reader: FileReader, data: Any, where: str) -> Blade:
-    made = _read_outline(reader, data, where)
-    if not isinstance(made, Blade):
+    shape = _read_outline(reader, data, where)
+    if not isinstance(shape, Blade):
         raise reader.fail(f"{where}.kind", "must be blade, because leaflets are simple")
-    return made
+    return shape
 
 
 def _outlined_model(shape: Blade | Needles | Compound) -> LeafModel:
     """The coarsest level of an outline that has no other: few faces, which show as much as the outline."""
-    made = fitted(shape, TOLERANCES[0], shown_area(shape, surface_of(shape, TOLERANCES[2], 0.0)), amount=0.0)
-    positions, uv = np.round(made.positions[0], 6), made.uv.astype(np.float32)
-    return LeafModel(positions, made.corner_verts, made.face_offsets, uv, shape=shape)
+    leaf = fitted(shape, TOLERANCES[0], shown_area(shape, surface_of(shape, TOLERANCES[2], 0.0)), amount=0.0)
+    positions, uv = np.round(leaf.positions[0], 6), leaf.uv.astype(np.float32)
+    return LeafModel(positions, leaf.corner_verts, leaf.face_offsets, uv, shape=shape)

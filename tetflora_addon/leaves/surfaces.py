@@ -223,14 +223,14 @@ def _shoot(needles: Needles, number: int, tolerance: float, factor: float) -> Le
     length = length * np.clip(0.75 + 1.5 * np.minimum(place, 1.15 - place), 0.0, 1.0)
     start = place[..., None] * needles.shoot * axis
     toward = axis - (direction * axis).sum(-1, keepdims=True) * direction
-    made = [_needles(start, direction, toward, length, needles, tolerance, factor)]
+    parts = [_needles(start, direction, toward, length, needles, tolerance, factor)]
     rings = 2 if tolerance > FLAT else 5
     stem = np.zeros((VARIANTS, rings, 3))
     stem[..., 1] = np.linspace(0.0, needles.shoot, rings)
     radius = needles.stem / 2.0 * np.linspace(1.0, _TAPER, rings)
-    made.append(tube(stem, radius, 3 if tolerance > _THREE else 5))
-    made[-1].uv[:, 1] -= 1.0  # below that of needles, as petioles
-    return joined(made)
+    parts.append(tube(stem, radius, 3 if tolerance > _THREE else 5))
+    parts[-1].uv[:, 1] -= 1.0  # below that of needles, as petioles
+    return joined(parts)
 
 
 def _needles(
@@ -337,10 +337,10 @@ def blade_surface(blade: Blade, tolerance: float, amount: float = 1.0) -> LeafSu
     for side in (1, -1):
         s, points = _dense(blade, side)
         chosen = simplified(bend(blade, points, amount).swapaxes(0, 1), tolerance)
-        own, made = _half(blade, side, s[chosen], points[chosen], ribs, columns, step)
-        faces.append(made + count)
-        flat.append(own)
-        count += len(own)
+        half, quads = _half(blade, side, s[chosen], points[chosen], ribs, columns, step)
+        faces.append(quads + count)
+        flat.append(half)
+        count += len(half)
     places = np.concatenate(flat)
     # Both halves share the midrib; what is the same place is one vertex.
     _, first, inverse = np.unique(np.round(places, 9) + 0.0, axis=0, return_index=True, return_inverse=True)
@@ -348,8 +348,8 @@ def blade_surface(blade: Blade, tolerance: float, amount: float = 1.0) -> LeafSu
     places = places[first]
     bent = bend(blade, places, amount)
     scale, start = 1.0 - blade.petiole, np.array([0.0, blade.petiole, 0.0])
-    made = _surface(bent * scale + start, every, places + [0.5, 0.0], error=tolerance * scale)
-    return joined([made, _petiole(blade, rows)]) if blade.petiole and tolerance < 0.02 else made
+    quads = _surface(bent * scale + start, every, places + [0.5, 0.0], error=tolerance * scale)
+    return joined([quads, _petiole(blade, rows)]) if blade.petiole and tolerance < 0.02 else quads
 
 
 def _half(
@@ -368,9 +368,9 @@ def _half(
     last = key.copy()  # rays that lead on to the column beside the margin
     for _ in range(_REPAIRS):
         chosen = [np.flatnonzero(key)] * (len(columns) - 1) + [np.flatnonzero(last)] * min(len(columns), 1)
-        inner = [feet[own] + t * (margin[own] - feet[own]) for own, t in zip(chosen, columns, strict=True)]
+        inner = [feet[index] + t * (margin[index] - feet[index]) for index, t in zip(chosen, columns, strict=True)]
         rays = [np.arange(0), *chosen, np.arange(len(s))]
-        lines = [(rib_s, ribs), *((s[own], line) for own, line in zip(chosen, inner, strict=True)), (s, margin)]
+        lines = [(rib_s, ribs), *((s[index], line) for index, line in zip(chosen, inner, strict=True)), (s, margin)]
         starts = np.cumsum([0, *(len(line) for _, line in lines)])
         strips = [_strip(lines[i][0], lines[i + 1][0], starts[i], starts[i + 1]) for i in range(len(lines) - 1)]
         places, faces = np.concatenate([line for _, line in lines]), np.concatenate(strips)
@@ -388,8 +388,8 @@ def _half(
         if (bad & ~last).any():
             last = last | bad
         else:
-            for own, start in zip(chosen, starts[1:], strict=False):
-                bad[own[used[start : start + len(own)]]] = True
+            for index, start in zip(chosen, starts[1:], strict=False):
+                bad[index[used[start : start + len(index)]]] = True
             bad |= np.roll(bad, 1) | np.roll(bad, -1)
             last = last | bad if (bad & ~last).any() else np.ones_like(last)
             key = key | (bad & last) if (bad & ~key).any() else last
@@ -443,9 +443,9 @@ def _petiole(blade: Blade, rows: int) -> LeafSurface:
     points[..., 2] = -0.1 * blade.petiole * np.sin(np.pi * along) * (1.0 + 0.5 * variant_offsets(9)[:, None])
     points[..., 0] = 0.06 * blade.petiole * np.sin(np.pi * along) * variant_offsets(10)[:, None]
     radius = _PETIOLE * (1.0 - blade.petiole) * np.linspace(1.25, 0.8, rings) * min(1.0, 3.0 * blade.width)
-    made = tube(points, radius, 5 if rows > 8 else 3)
-    made.uv[:] = np.stack([made.uv[:, 0], (made.uv[:, 1] - 1.0) * blade.petiole], axis=1)
-    return made
+    petiole = tube(points, radius, 5 if rows > 8 else 3)
+    petiole.uv[:] = np.stack([petiole.uv[:, 0], (petiole.uv[:, 1] - 1.0) * blade.petiole], axis=1)
+    return petiole
 
 
 @dataclass(frozen=True)
@@ -483,10 +483,10 @@ def compound_surface(compound: Compound, tolerance: float, amount: float = 1.0, 
         up = np.cross(across, along)
         size = length[i] * (1.0 + 0.05 * amount * variant_offsets(100 + i))
         frame = np.stack([factor * across, along, up], axis=2) * size[:, None, None]
-        at = np.zeros((VARIANTS, 3))
-        at[:, 1], at[:, 2] = place[i], 0.0 if petals else -compound.curl * place[i] ** 2
+        foot = np.zeros((VARIANTS, 3))
+        foot[:, 1], foot[:, 2] = place[i], 0.0 if petals else -compound.curl * place[i] ** 2
         # Each variant's leaflets are those of others: one after the other.
-        parts.append(replace(blade, positions=np.roll(blade.positions, i, axis=0)).moved(frame, at))
+        parts.append(replace(blade, positions=np.roll(blade.positions, i, axis=0)).moved(frame, foot))
     if compound.stem and tolerance < 0.02:
         parts.append(_rachis(compound, float(place.max()), tolerance))
     return replace(joined(parts), error=tolerance)
@@ -521,6 +521,6 @@ def _rachis(compound: Compound, end: float, tolerance: float) -> LeafSurface:
     points[..., 1] = np.linspace(0.0, end, rings)
     if not compound.around:
         points[..., 2] = -compound.curl * points[..., 1] ** 2
-    made = tube(points, compound.stem / 2 * np.linspace(1.0, 0.45, rings), 3 if tolerance > 0.001 else 5)
-    made.uv[:] = made.uv * [1.0, 0.0] + [0.0, -0.5]  # below that of blades, as petioles
-    return made
+    rachis = tube(points, compound.stem / 2 * np.linspace(1.0, 0.45, rings), 3 if tolerance > 0.001 else 5)
+    rachis.uv[:] = rachis.uv * [1.0, 0.0] + [0.0, -0.5]  # below that of blades, as petioles
+    return rachis

@@ -70,13 +70,13 @@ class LightBuffer:
         self.camera = camera
         self.width, self.height = buffer_size(camera, resolution)
         # What casts no shadow need not be drawn.
-        there = np.flatnonzero(extinction > 0.0).astype(np.int32)
-        found = tetrahedron_fragments(vertices[there], camera, self.width, self.height)
-        own = there[found.cell]
+        casting = np.flatnonzero(extinction > 0.0).astype(np.int32)
+        fragments = tetrahedron_fragments(vertices[casting], camera, self.width, self.height)
+        owner = casting[fragments.cell]
         with np.errstate(invalid="ignore"):
-            depth = np.nan_to_num(np.minimum(extinction[own] * found.thickness, OPAQUE))
-        depth = depth * np.minimum(found.coverage, 1.0)
-        parts = [(own, found.pixel, found.entry, found.thickness, depth)]
+            depth = np.nan_to_num(np.minimum(extinction[owner] * fragments.thickness, OPAQUE))
+        depth = depth * np.minimum(fragments.coverage, 1.0)
+        parts = [(owner, fragments.pixel, fragments.entry, fragments.thickness, depth)]
         if occluders is not None and len(occluders):
             end = occluder_depth(occluders, camera, self.width, self.height)
             hit = np.flatnonzero(np.isfinite(end))
@@ -85,7 +85,7 @@ class LightBuffer:
             nothing = np.zeros(len(hit))
             parts.append((np.full(len(hit), -1, np.int32), hit, shifted, nothing, np.full(len(hit), OPAQUE)))
         if sheets is not None and len(sheets):
-            parts += [(own + np.int32(len(vertices)), *rest) for own, *rest in self._sheet_fragments(sheets)]
+            parts += [(owner + np.int32(len(vertices)), *rest) for owner, *rest in self._sheet_fragments(sheets)]
         cell, pixel, entry, thickness, depth = (np.concatenate(arrays) for arrays in zip(*parts, strict=True))
         # One number to sort and look up by: the pixel, with the distance as its fraction.
         self._reach = float(entry.max(initial=0.0)) * 1.001 + 1e-9
@@ -98,9 +98,9 @@ class LightBuffer:
         self._entry, self._thickness, self._depth = (a.astype(np.float32) for a in (entry, thickness, depth))
         first, before = depth_in_front(self._pixel, depth)
         self._first, self._before = first.astype(np.int32), before.astype(np.float32)
-        own = self._cell * np.int64(self.width * self.height) + self._pixel
-        self._by_cell = np.argsort(own).astype(np.int32)
-        self._own_key = own[self._by_cell]
+        own_key = self._cell * np.int64(self.width * self.height) + self._pixel
+        self._by_cell = np.argsort(own_key).astype(np.int32)
+        self._own_key = own_key[self._by_cell]
 
     def _sheet_fragments(self, sheets: Floats) -> Iterator[tuple[NDArray, ...]]:
         """Owner, pixel, entry, thickness 0 and optical depth of sheets, some at a time.
@@ -130,9 +130,9 @@ class LightBuffer:
         number = np.where(longest > 1.0, np.fmin(np.ceil(4.0 * (covered + longest)), _MOST_PARTS), 1).astype(int)
         covered /= number
         corners = np.ascontiguousarray(sheets.transpose(1, 2, 0))
-        for some in chunks(number, POINT_BATCH - _MOST_PARTS):
-            owner, part = spread(number[some])
-            owner += some.start
+        for run in chunks(number, POINT_BATCH - _MOST_PARTS):
+            owner, part = spread(number[run])
+            owner += run.start
             # Even along sides as along diagonals: blades are long in either way.
             u, v = (part + 0.5) / number[owner], ((part - (number[owner] - 1) / 2.0) * _GOLDEN + 0.5) % 1.0
             weights = (1.0 - u) * (1.0 - v), u * (1.0 - v), u * v, (1.0 - u) * v
@@ -151,9 +151,9 @@ class LightBuffer:
         column, row = np.clip(np.ceil(place).astype(np.int64) - 1, 0, [self.width - 1, self.height - 1]).T
         nearest = row * self.width + column
         both = owner * (self.width * self.height) + nearest
-        key, first, own = np.unique(both, return_index=True, return_inverse=True)
-        fraction = np.bincount(own.ravel(), covered[owner], len(key))
-        meters = np.bincount(own.ravel(), meters, len(key)) / np.maximum(np.bincount(own.ravel()), 1)
+        key, first, inverse = np.unique(both, return_index=True, return_inverse=True)
+        fraction = np.bincount(inverse.ravel(), covered[owner], len(key))
+        meters = np.bincount(inverse.ravel(), meters, len(key)) / np.maximum(np.bincount(inverse.ravel()), 1)
         return owner[first], nearest[first], meters, fraction
 
     def __len__(self) -> int:
@@ -184,17 +184,17 @@ class LightBuffer:
             taps, inside = self._taps(points[part])
             depth = exact = own_depth[part][inside][:, None]
             if len(self):
-                place, found = self._last_before(taps)
-                depth = np.where(found, self._up_to(place, taps), 0.0)
-                own, has = self._own(taps, cells[part][inside])
+                place, behind = self._last_before(taps)
+                depth = np.where(behind, self._up_to(place, taps), 0.0)
+                fragment, has = self._own(taps, cells[part][inside])
                 # Small ones may overlap; what begins before the last fragment was counted in full.
-                counted = np.where(own < place, self._depth[own], self._partly(own, taps))
-                drawn = np.where(has & (own <= place), counted, 0.0)
+                counted = np.where(fragment < place, self._depth[fragment], self._partly(fragment, taps))
+                drawn = np.where(has & (fragment <= place), counted, 0.0)
                 # Where the point's own tetrahedron does not reach into a pixel, its neighbors do, or nothing is there.
                 depth = np.maximum(np.maximum(depth - drawn, 0.0) + np.minimum(drawn, exact), exact)
-            some = np.flatnonzero(inside) + part.start
-            result[some] = (np.exp(-depth) * taps.weight).sum(axis=1)
-            seen[some] = True
+            rows = np.flatnonzero(inside) + part.start
+            result[rows] = (np.exp(-depth) * taps.weight).sum(axis=1)
+            seen[rows] = True
         return result, seen
 
     def light_up(self, sources: Floats, polygons: Floats) -> None:
@@ -215,10 +215,10 @@ class LightBuffer:
         emitted, arriving = self._emitted, self._arriving
         for part in blocks(len(points), POINT_BATCH):
             taps, inside = self._taps(points[part])
-            place, found = self._last_before(taps)
+            place, behind = self._last_before(taps)
             through = np.exp(-(self._up_to(place, taps) - self._before[place]))[..., None]
             light = arriving[place] * through + emitted[place] * (1.0 - through)
-            light = np.where(found[..., None], light, 0.0) * taps.weight[..., None]
+            light = np.where(behind[..., None], light, 0.0) * taps.weight[..., None]
             result[np.flatnonzero(inside) + part.start] = light.sum(axis=1)
         return result
 
@@ -268,9 +268,9 @@ class LightBuffer:
         """The last fragment (k, 4) that begins in front of each point in each pixel, and whether there is one."""
         key = self._key(taps.pixel, taps.meters[:, None])
         place = np.searchsorted(self._order_key, key.ravel(), side="right").reshape(key.shape) - 1
-        found = place >= 0
+        behind = place >= 0
         place = np.maximum(place, 0)
-        return place, found & (self._pixel[place] == taps.pixel)
+        return place, behind & (self._pixel[place] == taps.pixel)
 
     def _own(self, taps: _Taps, cells: Integers) -> tuple[Integers, Mask]:
         """Fragment (k, 4) of each point's own tetrahedron in each pixel, and whether there is one."""

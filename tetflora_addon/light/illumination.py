@@ -137,13 +137,13 @@ class Illumination:
         """
         front, back = np.zeros((2, len(surfaces), 3), np.float32)
         for part in blocks(len(surfaces), BATCH):
-            own = surfaces.take(part)
-            hidden = 0.0 if own.dull is None else own.dull
-            fractions = scattering.scattered_fractions(own.color, own.transmission, hidden)
-            view = to_eye(camera, own.center)
-            sides = scattering.facet_ambient(own.normal, fractions, self.around(own.center, own.cell), view)
-            for toward, light in self.direct(own.center, own.cell, own.sheet):
-                added = scattering.facet_direct(own.normal, fractions, toward, light, view)
+            batch = surfaces.take(part)
+            hidden = 0.0 if batch.dull is None else batch.dull
+            fractions = scattering.scattered_fractions(batch.color, batch.transmission, hidden)
+            view = to_eye(camera, batch.center)
+            sides = scattering.facet_ambient(batch.normal, fractions, self.around(batch.center, batch.cell), view)
+            for toward, light in self.direct(batch.center, batch.cell, batch.sheet):
+                added = scattering.facet_direct(batch.normal, fractions, toward, light, view)
                 sides = sides[0] + added[0], sides[1] + added[1]
             front[part], back[part] = sides
         return front, back
@@ -155,13 +155,13 @@ class Illumination:
         """
         result = np.zeros((len(surfaces), 3), np.float32)
         for part in blocks(len(surfaces), BATCH):
-            own, weight = surfaces.take(part), plane[part, None]
-            fractions = scattering.scattered_fractions(own.color, own.transmission)
-            view, around = to_eye(camera, own.center), self.around(own.center, own.cell)
-            axis = own.normal * np.where(np.sum(own.normal * view, axis=1) < 0.0, -1.0, 1.0)[:, None]
+            batch, weight = surfaces.take(part), plane[part, None]
+            fractions = scattering.scattered_fractions(batch.color, batch.transmission)
+            view, around = to_eye(camera, batch.center), self.around(batch.center, batch.cell)
+            axis = batch.normal * np.where(np.sum(batch.normal * view, axis=1) < 0.0, -1.0, 1.0)[:, None]
             particles = scattering.particle_ambient(fractions, around, view)
             planes = scattering.facet_ambient(axis, fractions, around, view)[0]
-            for toward, light in self.direct(own.center, own.cell):
+            for toward, light in self.direct(batch.center, batch.cell):
                 particles += scattering.particle_direct(fractions, toward, light, view)
                 planes += scattering.facet_direct(axis, fractions, toward, light, view)[0]
             result[part] = (1.0 - weight) * particles + weight * planes
@@ -223,14 +223,14 @@ class Illumination:
     ) -> Floats:
         """Transmittance (m,) through the first of several views that sees each point."""
         empty = np.append(self.sheets.replaced, True)[cells]
-        own = np.where(empty, 0.0, self.clouds.own_depth(points, cells, toward))
+        depth = np.where(empty, 0.0, self.clouds.own_depth(points, cells, toward))
         owner = np.where(empty, -1, cells) if sheets is None else np.where(sheets < 0, cells, sheets + len(self.clouds))
-        result, waiting = np.exp(-own), np.ones(len(points), bool)
+        result, waiting = np.exp(-depth), np.ones(len(points), bool)
         for buffer in buffers:
-            some = np.flatnonzero(waiting)
-            through, seen = buffer.transmittance(points[some], owner[some], own[some])
-            result[some[seen]] = through[seen]
-            waiting[some[seen]] = False
+            rows = np.flatnonzero(waiting)
+            through, seen = buffer.transmittance(points[rows], owner[rows], depth[rows])
+            result[rows[seen]] = through[seen]
+            waiting[rows[seen]] = False
         return result
 
     def _from_sky(self, points: Floats, cells: Integers, sheets: Integers | None = None) -> Floats:
@@ -324,10 +324,10 @@ def _shadow_steps(
         views = buffers_of(light, clouds, fewer, occluders, fine)
         sky.append(views[0] if views else None)
         yield 0.3 + 0.3 * len(sky) / len(DIRECTIONS)
-    found = Illumination(clouds, sheets, lamps, sky, sources.world, (fewer, number))
-    for fraction in found.scatter(sources.ground, max(orders, 1)):
+    illumination = Illumination(clouds, sheets, lamps, sky, sources.world, (fewer, number))
+    for fraction in illumination.scatter(sources.ground, max(orders, 1)):
         yield 0.6 + 0.4 * fraction
-    return found
+    return illumination
 
 
 class SheetList:
@@ -429,13 +429,13 @@ def _middles(corners: NDArray[np.floating]) -> Floats:
 
 
 def baked_light(
-    flora: Flora, refinement: Refinement, camera: Camera, sources: Sources, made: SheetList, facets: bool
+    flora: Flora, refinement: Refinement, camera: Camera, sources: Sources, drawn: SheetList, facets: bool
 ) -> Generator[float, None, BakedLight]:
     """Render a refined scene from all of its lights; yields the fraction that is done.
 
-    All that is drawn as facets or polygons is in ``made``. Without ``facets``, proxies are clouds in the light instead.
+    What is drawn as facets or polygons is in ``drawn``. Without ``facets``, proxies are clouds in the light instead.
     """
-    corners, cell = made.corners(), numbers_of(refinement, refinement.nodes)
+    corners, cell = drawn.corners(), numbers_of(refinement, refinement.nodes)
     replaced = ~np.isin(refinement.decision, (Decision.PROXY, Decision.HIDDEN)) | facets
     replaced &= len(corners) > 0
     clouds = MediumCells.of(flora, refinement, refinement.nodes, ~replaced)
@@ -454,5 +454,5 @@ def baked_light(
             away = np.linalg.norm(corners[:, 0] - camera.eye, axis=1)
             radii = (fraction * away.max() for fraction in NEAR_FRACTIONS)
             near = Near(camera.eye, tuple(r for r in radii if (away < r).sum() >= NEAR_SHEETS))
-    found = yield from _shadow_steps(clouds, sources, resolution, sheets, near)
-    return BakedLight(found, inside, camera)
+    illumination = yield from _shadow_steps(clouds, sources, resolution, sheets, near)
+    return BakedLight(illumination, inside, camera)

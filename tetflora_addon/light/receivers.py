@@ -109,15 +109,15 @@ class MediumCells(Arrays):
         ``toward`` (3,) or (m, 3) are unit vectors to the light.
         """
         result = np.zeros(len(points))
-        some = np.flatnonzero(cells >= 0)
-        own = cells[some]
-        toward = np.broadcast_to(toward, (len(points), 3))[some]
-        inside = np.maximum(barycentric(self.vertices[own], points[some]), 0.0)
-        slopes = np.einsum("nkx,nx->nk", self.gradients[own], toward)
+        rows = np.flatnonzero(cells >= 0)
+        tetrahedra = cells[rows]
+        toward = np.broadcast_to(toward, (len(points), 3))[rows]
+        inside = np.maximum(barycentric(self.vertices[tetrahedra], points[rows]), 0.0)
+        slopes = np.einsum("nkx,nx->nk", self.gradients[tetrahedra], toward)
         # Toward the light a coordinate falls by its slope; the cell ends where the first reaches zero.
         with np.errstate(divide="ignore", invalid="ignore"):
             lengths = np.where(slopes < 0.0, inside / -slopes, np.inf).min(axis=1)
-        result[some] = np.where(np.isfinite(lengths), lengths, 0.0) * self.extinction(toward, own)
+        result[rows] = np.where(np.isfinite(lengths), lengths, 0.0) * self.extinction(toward, tetrahedra)
         return result
 
     def weights(self, points: Floats, cells: Integers) -> Floats:

@@ -174,7 +174,7 @@ def particle_ambient(fractions: Fractions, light: Floats, view: Floats) -> Float
     basis = harmonics(view)
     result = np.zeros_like(reflected)
     for band in range(3):
-        own = np.einsum("nk,nkc->nc", basis[:, band == BAND], light[:, band == BAND])
+        in_band = np.einsum("nk,nkc->nc", basis[:, band == BAND], light[:, band == BAND])
         mirrored = gloss[:, None] if band == 0 else 0.0
-        result += (_PHASE_BANDS[band] * (reflected + (-1) ** band * through) + mirrored) * own
+        result += (_PHASE_BANDS[band] * (reflected + (-1) ** band * through) + mirrored) * in_band
     return np.maximum(result, 0.0)

@@ -28,16 +28,16 @@ _LEAST_BLEND = 1e-3
 
 def split_areas(lights: tuple[Light, ...]) -> list[Light]:
     """Lights with each area as a few points of it, the same every time; colors add up."""
-    made: list[Light] = []
+    split: list[Light] = []
     for light in lights:
         if light.kind != "AREA":
-            made.append(light)
+            split.append(light)
             continue
         across, along = _disk_points() if light.ellipse else _grid_points(light.span)
         for x, y in zip(across, along, strict=True):
             position = light.position + x * light.span[0] + y * light.span[1]
-            made.append(replace(light, position=position, color=light.color / len(across)))
-    return made
+            split.append(replace(light, position=position, color=light.color / len(across)))
+    return split
 
 
 def _grid_points(span: Floats) -> tuple[Floats, Floats]:
@@ -151,23 +151,23 @@ def buffers_of(
         views = [closer for view in views for closer in _closer(view, near)] + views if near else views
     else:
         views = lamp_views(light.position, corners, pixels)
-    made = []
+    buffers = []
     for view in views:
         along = light.direction if sun else -to_eye(view, clouds.vertices.mean(axis=1))
         extinction = np.where(sheets.replaced, 0.0, clouds.extinction(along))
-        made.append(LightBuffer(view, pixels, clouds.vertices, extinction, occluders, sheets.corners))
-    return made
+        buffers.append(LightBuffer(view, pixels, clouds.vertices, extinction, occluders, sheets.corners))
+    return buffers
 
 
 def _closer(view: Camera, near: Near) -> list[Camera]:
     """Parts of a sun's view around an eye."""
     left, right, bottom, top = view.window
-    made = []
+    views = []
     x, y = (near.eye @ view.frame)[:2]
     for radius in near.radii:
         window = max(left, x - radius), min(right, x + radius), max(bottom, y - radius), min(top, y + radius)
         width, height = window[1] - window[0], window[3] - window[2]
         if min(width, height) > 0.0 and max(width, height) < 0.7 * max(right - left, top - bottom):
             columns, rows = image_size(width, height)
-            made.append(replace(view, window=window, width=columns, height=rows))
-    return made
+            views.append(replace(view, window=window, width=columns, height=rows))
+    return views

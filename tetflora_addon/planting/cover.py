@@ -140,9 +140,9 @@ def fallen_on(sheet: Sheet, canopy: Canopy, kinds: int) -> Generator[float, None
     # Never less than a cell, or plants between the middles of cells would shed nothing.
     reach = np.maximum(reach, 1.5 * sheet.cell)
     for kind in range(kinds):
-        own = np.flatnonzero((canopy.species == kind) & (canopy.area > 0.0))
-        for owner, cell, away in sheet.pairs(canopy.position[own, :2], reach[own]):
-            plant = own[owner]
+        plants = np.flatnonzero((canopy.species == kind) & (canopy.area > 0.0))
+        for owner, cell, away in sheet.pairs(canopy.position[plants, :2], reach[plants]):
+            plant = plants[owner]
             rest = np.maximum(1.0 - (away * away).sum(axis=1) / reach[plant] ** 2, 0.0)
             falls = canopy.area[plant] * 3.0 / (np.pi * reach[plant] ** 2) * rest * rest
             out[kind] += np.bincount(cell, falls, minlength=out.shape[1])
@@ -203,8 +203,8 @@ class Floor:
         values = self.map_of(habitat, species)
 
         def suitable(points: Floats) -> Floats:
-            found = self.sheet.at(values, points)
-            return found * clumps(points, size, keeps, key) if keeps else found
+            shares = self.sheet.at(values, points)
+            return shares * clumps(points, size, keeps, key) if keeps else shares
 
         return suitable
 
@@ -222,11 +222,11 @@ class Floor:
             whole = self.fallen.sum(axis=0)
             if species is not None and not 0 <= species < len(self.fallen):
                 return np.zeros(len(light))
-            own = whole if species is None else self.fallen[species]
+            fallen = whole if species is None else self.fallen[species]
             if habitat is Habitat.FALLEN:  # in the same amount, not only where they hide the ground
-                return np.minimum(own / FULL, 1.0)
+                return np.minimum(fallen / FULL, 1.0)
             covered = 1.0 - np.exp(-whole / (_LEAVES if habitat is Habitat.LITTER else _WOOD))
-            return covered * own / np.maximum(whole, 1e-12)
+            return covered * fallen / np.maximum(whole, 1e-12)
         return np.ones(len(light))
 
     def _smothered(self) -> Floats:

@@ -87,11 +87,11 @@ class Company:
             changed = False
             for number, rule in seeking:
                 asked = np.flatnonzero(~gone & (species == rule.species) & _follows(keys, number, rule))
-                there = points[~gone & (species == rule.other)]
+                others = points[~gone & (species == rule.other)]
                 alone = ~Neighbors(older._standing(rule.other), rule.distance).near(points[asked])
                 # Among their own kind they meet themselves as well.
                 least = 2 if rule.other == rule.species else 1
-                alone[alone] = ~Neighbors(there, rule.distance).near(points[asked[alone]], least)
+                alone[alone] = ~Neighbors(others, rule.distance).near(points[asked[alone]], least)
                 gone[asked[alone]] = True
                 changed |= bool(alone.any())
         return gone

@@ -101,13 +101,13 @@ class Lines:
         place = np.floor((points - self.low) / self.cell)
         within = np.flatnonzero(((place >= 0) & (place < (self.columns, self.rows))).all(axis=1))
         column, row = place[within].astype(np.int64).T
-        at, stop = self.begins[row * self.columns + column], self.begins[row * self.columns + column + 1]
+        cursor, stop = self.begins[row * self.columns + column], self.begins[row * self.columns + column + 1]
         while len(within):  # as often as the fullest cell has pieces
-            open_ = at < stop
-            within, at, stop = within[open_], at[open_], stop[open_]
-            piece = self.piece[at]
+            open_ = cursor < stop
+            within, cursor, stop = within[open_], cursor[open_], stop[open_]
+            piece = self.piece[cursor]
             ratio[within] = np.minimum(ratio[within], self._gap(points[within], piece) / self.reach[piece])
-            at = at + 1
+            cursor = cursor + 1
         return ratio
 
     def _column_row(self, points: Floats) -> Integers:
@@ -221,9 +221,9 @@ class Spacing:
     def _outranked(self, speakers: Floats) -> Mask:
         """Which speakers, one a cell and in order of rank, have an earlier one in cells that are close."""
         outranked = np.zeros(len(speakers), bool)
-        own = cells_of(speakers, self.cell)
-        order = np.argsort(own)
-        cells = own[order]
+        homes = cells_of(speakers, self.cell)
+        order = np.argsort(homes)
+        cells = homes[order]
         for step in _NEAR:
             wanted = cells_of(speakers, self.cell, step)
             place = np.minimum(np.searchsorted(cells, wanted), len(cells) - 1)

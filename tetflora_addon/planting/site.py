@@ -80,8 +80,8 @@ class Zone:
         z = spots.position[:, 2]
         share *= soft_between(z, one.altitude_min, one.altitude_max, one.altitude_softness, -inf, inf)
         if self.weight is not None:
-            own = np.clip(np.nan_to_num(self.weight[spots.triangle]), 0.0, 1.0)
-            share *= np.einsum("ij,ij->i", own, spots.barycentric)
+            weights = np.clip(np.nan_to_num(self.weight[spots.triangle]), 0.0, 1.0)
+            share *= np.einsum("ij,ij->i", weights, spots.barycentric)
         if self.image is not None:
             uv = np.einsum("ijk,ij->ik", self.uv[spots.triangle], spots.barycentric)
             share *= np.clip(np.nan_to_num(sampled(self.image, uv)), 0.0, 1.0)
@@ -228,14 +228,14 @@ class Site:
 
         Stops when ``enough`` are found, with at least as many. ``suits`` is what one species asks for besides.
         """
-        parts, drawn, found = [], 0, 0
+        parts, drawn, suitable = [], 0, 0
         lost = dict.fromkeys(REMEDIES, 0)
-        while drawn < count and (enough is None or found < enough):
+        while drawn < count and (enough is None or suitable < enough):
             chunk = min(count - drawn, CHUNK)
             keys = child_key(key, np.arange(first + drawn, first + drawn + chunk))
             parts.append(self._suitable(keys, lost, suits))
             drawn += chunk
-            found += len(parts[-1][2])
+            suitable += len(parts[-1][2])
         position, up, keys = (np.concatenate(column) for column in zip(*parts, strict=True))
         return Sample(position, up, keys, drawn, lost)
 

@@ -128,7 +128,7 @@ def paint(brush: Brush, center: Sequence[float], standing: Floats, key: Keys, da
     if brush.strength < 1.0:
         lucky = uniform(child_key(cell_keys, dab), _Draw.CHANCE) < brush.strength
         cells, cell_keys = cells[lucky], cell_keys[lucky]
-    found, keys = [np.zeros((0, 2))], [np.zeros(0, np.uint64)]
+    planted, keys = [np.zeros((0, 2))], [np.zeros(0, np.uint64)]
     for attempt in range(_TRIES):
         tried = child_key(cell_keys, attempt)
         places = (cells + np.stack([uniform(tried, _Draw.X), uniform(tried, _Draw.Y)], axis=1)) * side
@@ -138,16 +138,16 @@ def paint(brush: Brush, center: Sequence[float], standing: Floats, key: Keys, da
             cells, cell_keys, tried, places = cells[inside], cell_keys[inside], tried[inside], places[inside]
             inside = inside[inside]
         chosen = np.flatnonzero(inside)
-        spacing = Spacing(brush.min_distance, np.concatenate([standing, *found]))
+        spacing = Spacing(brush.min_distance, np.concatenate([standing, *planted]))
         chosen = chosen[spacing.admit(places[chosen], len(chosen))]
-        found.append(places[chosen])
+        planted.append(places[chosen])
         keys.append(tried[chosen])
         left = np.ones(len(cells), bool)
         left[chosen] = False
         cells, cell_keys = cells[left], cell_keys[left]
         if brush.min_distance < NO_DISTANCE or not len(cells):
             break
-    return np.concatenate(found), np.concatenate(keys)
+    return np.concatenate(planted), np.concatenate(keys)
 
 
 def erase(brush: Brush, center: Sequence[float], standing: Floats, key: Keys, dab: int) -> Integers:

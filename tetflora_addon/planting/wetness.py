@@ -104,8 +104,8 @@ def height_grid(triangles: Floats, cell: float) -> HeightGrid:
     number = np.maximum(highest - lowest + 1, 0)
     for run in chunks(number, _ENTRIES):
         owner, offset = spread(number[run])
-        own = run.start + owner
-        _draw(corners, slope, own, lowest[own] + offset, columns, top)
+        triangle = run.start + owner
+        _draw(corners, slope, triangle, lowest[triangle] + offset, columns, top)
     return HeightGrid(west, south, cell, np.where(np.isneginf(top), np.nan, top).reshape(rows, columns))
 
 
@@ -124,11 +124,11 @@ def _planes(corners: Floats) -> tuple[Floats, Mask]:
     return np.stack([east, north], axis=1), upright
 
 
-def _draw(corners: Floats, slope: Floats, own: Integers, row: Integers, columns: int, top: Floats) -> None:
-    """Raise the cells of rows (k,) of the triangles ``own`` (k,) to these, in ``top`` (cells,)."""
-    left, right = np.full(len(own), np.inf), np.full(len(own), -np.inf)
+def _draw(corners: Floats, slope: Floats, triangle: Integers, row: Integers, columns: int, top: Floats) -> None:
+    """Raise the cells of rows (k,), each of a ``triangle`` (k,), to that, in ``top`` (cells,)."""
+    left, right = np.full(len(triangle), np.inf), np.full(len(triangle), -np.inf)
     for corner in range(3):
-        a, b = corners[own, corner, :2], corners[own, (corner + 1) % 3, :2]
+        a, b = corners[triangle, corner, :2], corners[triangle, (corner + 1) % 3, :2]
         rise = b[:, 1] - a[:, 1]
         meets = (np.minimum(a[:, 1], b[:, 1]) <= row + _HAIR) & (np.maximum(a[:, 1], b[:, 1]) >= row - _HAIR)
         along = np.clip((row - a[:, 1]) / np.where(rise == 0.0, 1.0, rise), 0.0, 1.0)
@@ -138,13 +138,13 @@ def _draw(corners: Floats, slope: Floats, own: Integers, row: Integers, columns:
         left = np.where(meets, np.minimum(left, np.minimum(x, other)), left)
         right = np.where(meets, np.maximum(right, np.maximum(x, other)), right)
     met = left <= right
-    own, row, left, right = own[met], row[met], left[met], right[met]
+    triangle, row, left, right = triangle[met], row[met], left[met], right[met]
     first = np.clip(np.ceil(left - _HAIR), 0, columns).astype(np.int64)
     number = np.maximum(np.clip(np.floor(right + _HAIR), -1, columns - 1).astype(np.int64) - first + 1, 0)
     for run in chunks(number, _ENTRIES):
         owner, offset = spread(number[run])
         span = run.start + owner
-        column, mine = first[span] + offset, own[span]
+        column, mine = first[span] + offset, triangle[span]
         corner = corners[mine, 0]
         height = corner[:, 2] + slope[mine, 0] * (column - corner[:, 0]) + slope[mine, 1] * (row[span] - corner[:, 1])
         # Planes of slivers are steep, and a hair beside them may be far above.
@@ -193,9 +193,9 @@ def _sweep(water: Floats, ground: Floats, lines: range, before: int, cell: float
     """Let water of each line sink to the ground, or to a hair above that of the line before."""
     straight, oblique = _DRAIN * cell, _DRAIN * cell * np.sqrt(2.0)
     for line in lines:
-        other, own = water[line + before], water[line, 1:-1]
+        other, inner = water[line + before], water[line, 1:-1]
         lowest = np.minimum(np.minimum(other[:-2], other[2:]) + oblique, other[1:-1] + straight)
-        np.minimum(own, np.maximum(lowest, ground[line, 1:-1]), out=own)
+        np.minimum(inner, np.maximum(lowest, ground[line, 1:-1]), out=inner)
 
 
 def _catchment(surface: Floats, cell: float) -> Floats:
@@ -209,13 +209,13 @@ def _catchment(surface: Floats, cell: float) -> Floats:
     rows, columns = surface.shape
     wide = columns + 2
     level = np.pad(np.where(np.isnan(surface), np.inf, surface), 1, constant_values=np.inf)
-    there = np.isfinite(level)
+    land = np.isfinite(level)
     share = np.zeros((len(_AROUND), level.size))
     inner = (slice(1, -1), slice(1, -1))
     for k, (i, j, away) in enumerate(_AROUND):
         other = level[1 + i : 1 + i + rows, 1 + j : 1 + j + columns]
         with np.errstate(invalid="ignore"):
-            fall = np.where(there[inner] & np.isfinite(other), level[inner] - other, 0.0) / (cell * away)
+            fall = np.where(land[inner] & np.isfinite(other), level[inner] - other, 0.0) / (cell * away)
         share[k].reshape(level.shape)[inner] = np.maximum(fall, 0.0) ** _SPREAD
     total = share.sum(axis=0)
     share /= np.where(total > 0.0, total, 1.0)
@@ -224,7 +224,7 @@ def _catchment(surface: Floats, cell: float) -> Floats:
     for k, step in enumerate(steps.tolist()):
         waits[np.flatnonzero(share[k] > 0.0) + step] += 1  # each cell once for one direction
     area = np.zeros(level.size)
-    ready = np.flatnonzero(there.reshape(-1) & (waits == 0))
+    ready = np.flatnonzero(land.reshape(-1) & (waits == 0))
     while len(ready):
         came = np.full(len(ready), cell * cell)
         for k, step in enumerate(steps.tolist()):
@@ -283,11 +283,11 @@ _kept: dict[bytes, WetGround] = {}  # the last one, by content: layers of plants
 def wet_ground(triangles: Floats) -> WetGround:
     """How wet a ground (t, 3, 3) is; that of the last one is kept."""
     key = blake2b(np.ascontiguousarray(triangles).data, digest_size=16).digest()
-    made = _kept.get(key)  # other threads may forget it meanwhile
-    if made is None:
+    wet = _kept.get(key)  # other threads may forget it meanwhile
+    if wet is None:
         cell = cell_for(triangles, _FINEST, _MOST)
         grid = height_grid(triangles, cell)
-        made = WetGround(grid, wetness(grid.height, cell))
+        wet = WetGround(grid, wetness(grid.height, cell))
         _kept.clear()
-        _kept[key] = made
-    return made
+        _kept[key] = wet
+    return wet

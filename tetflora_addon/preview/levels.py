@@ -101,9 +101,9 @@ class Levels:
 
     def back_to_front(self, level: Level, camera: Camera, chosen: NDArray | None = None) -> Integers:
         """Exact back-to-front order of a level's places (t,), or of those ``chosen`` (k,), for any camera there."""
-        some = np.arange(len(level)) if chosen is None else chosen
+        places = np.arange(len(level)) if chosen is None else chosen
         rank = self.tree.order(**camera.line_of_sight, back_to_front=True)
-        return some[np.argsort(rank[self._below[level.nodes[some]]], kind="stable")]
+        return places[np.argsort(rank[self._below[level.nodes[places]]], kind="stable")]
 
 
 def gather(
@@ -170,9 +170,9 @@ def _mean_colors(flora: Flora, contents: Contents, nodes: Integers, size: int) -
 
 def ramp(fraction: NDArray[np.floating]) -> Floats32:
     """Colors (n, 3) for fractions (n,): dark violet at 0, through green, to bright yellow at 1."""
-    at = np.clip(fraction, 0.0, 1.0) * (len(_RAMP) - 1)
-    low = np.minimum(at.astype(np.intp), len(_RAMP) - 2)
-    return (_RAMP[low] + (_RAMP[low + 1] - _RAMP[low]) * (at - low)[:, None]).astype(np.float32)
+    position = np.clip(fraction, 0.0, 1.0) * (len(_RAMP) - 1)
+    low = np.minimum(position.astype(np.intp), len(_RAMP) - 2)
+    return (_RAMP[low] + (_RAMP[low + 1] - _RAMP[low]) * (position - low)[:, None]).astype(np.float32)
 
 
 def colors_of(level: Level, mode: str, deepest: int) -> Floats32:

@@ -174,10 +174,10 @@ def _looks_of_kinds(flora: Flora, seeds: Seeds) -> Floats32:
     order = np.argsort(seeds.species.astype(np.int16), kind="stable")  # of so few bits it counts instead of comparing
     number = np.bincount(seeds.species)
     places = (np.arange(_SOME) + 0.5) / _SOME * number[:, None] + (np.cumsum(number) - number)[:, None]
-    some = seeds.take(order[places[number > 0].astype(np.int64).ravel()])
+    sample = seeds.take(order[places[number > 0].astype(np.int64).ravel()])
     looks = np.zeros((len(flora.species), 7), np.float32)
-    found = np.column_stack(_looks(flora, trunks(flora.rows, some))).reshape(-1, _SOME, 7)
-    looks[some.species[::_SOME]] = found.mean(axis=1)
+    sample_looks = np.column_stack(_looks(flora, trunks(flora.rows, sample))).reshape(-1, _SOME, 7)
+    looks[sample.species[::_SOME]] = sample_looks.mean(axis=1)
     return looks
 
 
@@ -189,21 +189,21 @@ def nearest(shapes: Shapes, eye: Floats, most: int = MOST_FACES) -> tuple[Shapes
     crowns = shapes.crowns
     away = crowns.positions - (eye - shapes.origin).astype(np.float32)
     size = crowns.forms[:, 1] ** 2 / np.maximum(np.einsum("ni,ni->n", away, away), 1e-6)
-    some = np.argpartition(size, -most)[-most:] if len(size) > most else np.arange(len(size))
-    some = some[np.argsort(-size[some])]  # the nearest hide what is drawn after them, which then costs little
-    return with_faces(shapes, some), float(np.sqrt(size[some].min(initial=np.inf)))
+    largest = np.argpartition(size, -most)[-most:] if len(size) > most else np.arange(len(size))
+    largest = largest[np.argsort(-size[largest])]  # the nearest hide what is drawn after them, which then costs little
+    return with_faces(shapes, largest), float(np.sqrt(size[largest].min(initial=np.inf)))
 
 
-def with_faces(shapes: Shapes, some: Integers | slice = slice(None)) -> Shapes:
+def with_faces(shapes: Shapes, points: Integers | slice = slice(None)) -> Shapes:
     """Points, or some (k,) of them, as crowns and trunks with faces."""
     crowns = shapes.crowns
-    looks, forms, up = crowns.looks[crowns.kinds[some]], crowns.forms[some], crowns.axes[some]
+    looks, forms, up = crowns.looks[crowns.kinds[points]], crowns.forms[points], crowns.axes[points]
     across = np.cross(up, np.where(np.abs(up[:, :1]) < 0.9, [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]))
     across /= np.linalg.norm(across, axis=1, keepdims=True)
     frame = np.stack([across, np.cross(up, across), up], axis=2)
     shown = np.column_stack([forms[:, :2], looks[:, 3:4] * forms[:, 2:]])
     foot, leaves, wood = _THIN * forms[:, 1], looks[:, :3], looks[:, 4:]
-    positions, colors = _crowns(crowns.positions[some], frame, shown, foot, leaves, wood)
+    positions, colors = _crowns(crowns.positions[points], frame, shown, foot, leaves, wood)
     indices = _repeated(_faces(), len(_NORMALS), len(up))
     return Shapes(positions, colors, indices, len(up), shapes.of, shapes.origin)
 
@@ -243,22 +243,22 @@ def thinned(seeds: Seeds, heights: Floats, most: int = MOST_PLANTS) -> Seeds:
 def _shown(flora: Flora, seeds: Seeds, most: int) -> tuple[int, Floats, Branches]:
     """How many plants there are, where coordinates begin (3,), and the trunks of at most so many."""
     origin = origin_near(seeds.position)
-    some = thinned(seeds, flora.rows["length"][flora.first_row, 0], most).counted_from(origin)
-    return len(seeds), origin, trunks(flora.rows, some)
+    shown = thinned(seeds, flora.rows["length"][flora.first_row, 0], most).counted_from(origin)
+    return len(seeds), origin, trunks(flora.rows, shown)
 
 
 def _profiles(flora: Flora) -> Floats:
     """Of each species (s, 4): lowest and highest leaves, and radii of its crown's rings, for a trunk of length 1."""
     summer = flora.in_leaf
     if summer not in _known:
-        found, number = np.stack([_profile(flora, int(row)) for row in flora.first_row]), len(flora.first_row)
+        profiles, number = np.stack([_profile(flora, int(row)) for row in flora.first_row]), len(flora.first_row)
         alike = np.zeros(number, np.int64), np.zeros((number, 3)), np.tile(np.eye(3), (number, 1, 1)), np.ones(number)
         plants = trunks(summer.rows, Seeds(("",) * number, np.arange(number, dtype=np.int32), *alike))
         # Of what is turned all ways, a half of leaves and a π-th of the surface of wood shows.
         area = 0.5 * summer.leaf_areas(plants) + summer.wood_areas(plants) / np.pi
         # What is seen through covers as much as it does, and is narrower for that.
-        found[:, 2:] *= -np.expm1(-area / np.maximum(_from_the_side(found) * plants.length**2, 1e-9))[:, None]
-        _known[summer] = found
+        profiles[:, 2:] *= -np.expm1(-area / np.maximum(_from_the_side(profiles) * plants.length**2, 1e-9))[:, None]
+        _known[summer] = profiles
     return _known[summer]
 
 

@@ -43,14 +43,14 @@ def in_view(seeds: Seeds, views: Sequence[Floats]) -> InView:
         meter, ahead = np.linalg.norm(matrix[:2, :3], axis=1), clip[:, 2]  # below zero behind a perspective eye
         across, down = (np.abs(clip[:, k]) < ahead + _AROUND * meter[k] for k in (0, 1))
         inside = np.flatnonzero(across & down & (ahead > 0.0))
-        at = clip[inside, :2] / ahead[inside, None]
+        screen = clip[inside, :2] / ahead[inside, None]
         area = 0.25 * meter[0] * meter[1] * (_PARTS / ahead[inside]) ** 2
-        x, y = np.clip((0.5 + 0.5 * at.T) * _PARTS, 0, _PARTS - 1).astype(np.int64)
+        x, y = np.clip((0.5 + 0.5 * screen.T) * _PARTS, 0, _PARTS - 1).astype(np.int64)
         larger = np.flatnonzero(area > covered[inside])
         covered[inside[larger]] = area[larger]
         part[inside[larger]] = (x + _PARTS * (y + _PARTS * number))[larger]
-    some = np.flatnonzero(covered > 0.0)
-    return InView(seeds.take(some), part[some], covered[some], uniform(place_keys(seeds.position[some]), _SHOWN))
+    seen = np.flatnonzero(covered > 0.0)
+    return InView(seeds.take(seen), part[seen], covered[seen], uniform(place_keys(seeds.position[seen]), _SHOWN))
 
 
 def shown(plants: InView, areas: Floats, most: int = MOST) -> Seeds:
@@ -69,6 +69,6 @@ def shown(plants: InView, areas: Floats, most: int = MOST) -> Seeds:
     layers = np.bincount(plants.part, layer)[plants.part]
     needed = np.minimum(np.maximum(LAYERS / np.maximum(layers, LAYERS), layer), 1.0)
     fewer = min(most / max(needed.sum(), 1.0), 1.0)
-    some = np.flatnonzero(plants.draw < needed * fewer)
-    seeds = plants.seeds.take(some[np.argsort(-plants.covered[some])])  # the nearest hide what is drawn after them
+    kept = np.flatnonzero(plants.draw < needed * fewer)
+    seeds = plants.seeds.take(kept[np.argsort(-plants.covered[kept])])  # the nearest hide what is drawn after them
     return seeds if fewer == 1.0 else replace(seeds, scale=seeds.scale * fewer**-0.5)

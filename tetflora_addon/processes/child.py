@@ -81,7 +81,7 @@ class _Clock:
 def main() -> None:
     """Answer messages until there are none."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl+C is for the one who started this
-    given, made = os.fdopen(os.dup(0), "rb", 1 << 16), os.fdopen(os.dup(1), "wb", 1 << 16)
+    given, replies = os.fdopen(os.dup(0), "rb", 1 << 16), os.fdopen(os.dup(1), "wb", 1 << 16)
     os.dup2(os.open(os.devnull, os.O_WRONLY), 1)  # what prints is lost: this stream is for messages
     package, paths = sys.argv[1:]
     sys.path[:] = json.loads(paths)
@@ -91,9 +91,9 @@ def main() -> None:
         memory = importlib.import_module(f"{package}.memory")
         importlib.import_module("numpy")
     except Exception as error:
-        messages.send(made, ("failed", repr(error)))
+        messages.send(replies, ("failed", repr(error)))
         return
-    messages.send(made, ("ready", ""))
+    messages.send(replies, ("ready", ""))
     shared: dict[int, object] = {}
     clock = _Clock(memory.give_back)
     while True:
@@ -114,7 +114,7 @@ def main() -> None:
                 answer = messages.Packed(("made", function(shared[number], item), "", peak()))
             except BaseException as error:
                 answer = messages.Packed(("failed", error, traceback.format_exc(), peak()))
-            messages.send(made, answer)
+            messages.send(replies, answer)
             del function, item, answer
         del rest
         clock.since, clock.busy = time.monotonic(), False

@@ -68,11 +68,11 @@ def receive(stream: BinaryIO) -> list[object]:
     (number,) = _numbers(stream, 1)
     counts = _numbers(stream, number)
     parts = iter([_read(stream, size) for size in _numbers(stream, sum(counts))])
-    found = []
+    objects = []
     for count in counts:
         data, *arrays = (next(parts) for _ in range(count))
-        found.append(pickle.loads(data, buffers=arrays))
-    return found
+        objects.append(pickle.loads(data, buffers=arrays))
+    return objects
 
 
 def _numbers(stream: BinaryIO, count: int) -> list[int]:

@@ -98,11 +98,11 @@ def in_processes(
     if not worth or parallel.within() or not number():
         yield from (function(shared, item) for item in items)
         return
-    own = _Given(shared)
+    given = _Given(shared)
     try:
-        yield from parallel.on_all_cores(lambda item: _call(function, own, item), items)
+        yield from parallel.on_all_cores(lambda item: _call(function, given, item), items)
     finally:
-        own.forgotten = True
+        given.forgotten = True
         _tidy()
 
 
@@ -270,17 +270,17 @@ class _Child:
 def _call(function: Callable[[_Shared, _Item], _Result], shared: _Given, item: _Item) -> _Result:
     """The function's result by a process; another takes over for one that has ended, and in the end this one."""
     answer, tried = None, 0
-    while answer is None and tried < 2 and (own := _taken()) is not None:
+    while answer is None and tried < 2 and (child := _taken()) is not None:
         try:
-            if own.greet():
+            if child.greet():
                 tried += 1
-                answer = own.call(function, shared, item)
+                answer = child.call(function, shared, item)
         except _StartError as error:
             _break(f"cannot be started: {error}")
         except (Closed, OSError):
-            _count_death(own.end())
+            _count_death(child.end())
         finally:
-            _give(own)
+            _give(child)
     if answer is None:
         if _pool.stopped:
             raise Closed("other processes were stopped")
@@ -304,51 +304,51 @@ def _taken() -> _Child | None:
     return None
 
 
-def _give(own: _Child) -> None:
+def _give(child: _Child) -> None:
     """Let others have a process, if it still runs."""
     with _pool.changed:
-        _pool.largest = max(_pool.largest, own.peak)
+        _pool.largest = max(_pool.largest, child.peak)
         with suppress(Closed, OSError):
-            own.forget()
-        if _pool.stopped or _pool.broken or not own.runs or len(_pool.children) > max(number(), 1):
-            _leave(own)
+            child.forget()
+        if _pool.stopped or _pool.broken or not child.runs or len(_pool.children) > max(number(), 1):
+            _leave(child)
         else:
-            _pool.idle.append(own)
+            _pool.idle.append(child)
         _pool.changed.notify_all()
 
 
-def _leave(own: _Child) -> None:
-    own.kill()
-    own.end()
-    _pool.children.remove(own)
+def _leave(child: _Child) -> None:
+    child.kill()
+    child.end()
+    _pool.children.remove(child)
 
 
 def _tidy() -> None:
     """Let all processes give memory back that nobody needs; those at work do so after it."""
     with _pool.changed:
-        for own in _pool.idle:
+        for child in _pool.idle:
             with suppress(Closed, OSError):
-                own.forget()
+                child.forget()
 
 
 def _start_all() -> None:
     while True:
         with _pool.changed:
-            if len(_pool.children) >= number() or (own := _started()) is None:
+            if len(_pool.children) >= number() or (child := _started()) is None:
                 return
-            _pool.idle.append(own)
+            _pool.idle.append(child)
             _pool.changed.notify_all()
 
 
 def _started() -> _Child | None:
     """One more process; None where the system refuses it."""
     try:
-        own = _Child()
+        child = _Child()
     except OSError as error:
         _break(f"cannot be started: {error}")
         return None
-    _pool.children.append(own)
-    return own
+    _pool.children.append(child)
+    return child
 
 
 def _count_death(code: int) -> None:

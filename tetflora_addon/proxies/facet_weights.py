@@ -92,10 +92,10 @@ def _with_share(tables: Floats, row: Integers, count: Floats, share: Floats | No
     # Parts that bear little besides cones or blossoms may have fewer leaves than any plant has.
     low = np.clip(np.searchsorted(-shares, -share), 1, len(tables) - 1)
     for node in np.unique(low[share != 1.0]).tolist():
-        some = np.flatnonzero((low == node) & (share != 1.0))
-        less, more = (1.0 / by_number(tables[i], row[some], count[some], COUNTS) for i in (node, node - 1))
-        place = np.maximum(share[some] - shares[node], 0.0) / (shares[node - 1] - shares[node])
-        out[some] = 1.0 / (less + place * (more - less))
+        index = np.flatnonzero((low == node) & (share != 1.0))
+        less, more = (1.0 / by_number(tables[i], row[index], count[index], COUNTS) for i in (node, node - 1))
+        place = np.maximum(share[index] - shares[node], 0.0) / (shares[node - 1] - shares[node])
+        out[index] = 1.0 / (less + place * (more - less))
     return out
 
 
@@ -118,8 +118,8 @@ def _of_states(flora: Flora, species: tuple[tuple[int, tuple[int, ...]], ...]) -
     number = 1 + max((state for _, states in species for state in states), default=0)
     weights = np.ones((2, number, len(flora.rows), len(COUNTS)))
     for one, states in species:
-        found = _weights_of(flora, one, states, _known)
-        weights[:, : found.shape[1], flora.rows["species"] == one] = found
+        table = _weights_of(flora, one, states, _known)
+        weights[:, : table.shape[1], flora.rows["species"] == one] = table
     return FacetWeights(*weights, are_solids(flora.rows))
 
 
@@ -138,11 +138,11 @@ def measuring(flora: Flora, species: Collection[int]) -> Generator[tuple[str, fl
     """
     for number in sorted(set(species)):
         left = [variant for variant in needed(flora, number) if _known(*variant) is None]
-        for i, (own, one) in enumerate(left):
-            name, content = own.species[one].name, digest(own, one)
-            steps = fitting(own, one, RAYS)
-            found = yield from mapped(steps, lambda done, i=i, name=name, left=left: (name, (i + done) / len(left)))
-            _found[content] = cached(_KIND, content, found.shape, lambda found=found: found)
+        for i, (compiled, one) in enumerate(left):
+            name, content = compiled.species[one].name, digest(compiled, one)
+            steps = fitting(compiled, one, RAYS)
+            table = yield from mapped(steps, lambda done, i=i, name=name, left=left: (name, (i + done) / len(left)))
+            _found[content] = cached(_KIND, content, table.shape, lambda table=table: table)
 
 
 def _known(flora: Flora, number: int) -> Floats | None:
@@ -198,25 +198,25 @@ def fitting(flora: Flora, number: int, rays: float = np.inf) -> Generator[float,
 
 def _families(flora: Flora, number: int) -> dict[int, list[Branches]]:
     """Sub-plants of each row of a species that grow together, in a few plants."""
-    level, plant, found = trunks(flora.rows, Seeds.upright(FAMILIES, number)), np.arange(FAMILIES), {}
+    level, plant, by_row = trunks(flora.rows, Seeds.upright(FAMILIES, number)), np.arange(FAMILIES), {}
     while len(level):
-        some = []
+        groups = []
         for row in np.unique(level.row):
-            own, most = np.flatnonzero(level.row == row), _POLYGONS / FAMILIES / max(flora.polygons[row], 1.0)
-            for members in _neighbors(level, own, plant, most):
-                some.append(members)
-                found.setdefault(int(row), []).append(level.take(members))
-        chosen = np.concatenate(some)
+            subplants, most = np.flatnonzero(level.row == row), _POLYGONS / FAMILIES / max(flora.polygons[row], 1.0)
+            for members in _neighbors(level, subplants, plant, most):
+                groups.append(members)
+                by_row.setdefault(int(row), []).append(level.take(members))
+        chosen = np.concatenate(groups)
         level, parent, _, _ = open_subplants(flora, level.take(chosen))
         plant = plant[chosen][parent]
-    return {row: _affordable(flora, families) for row, families in found.items()}
+    return {row: _affordable(flora, families) for row, families in by_row.items()}
 
 
-def _neighbors(level: Branches, own: Integers, plant: Integers, most: float) -> Iterator[Integers]:
+def _neighbors(level: Branches, subplants: Integers, plant: Integers, most: float) -> Iterator[Integers]:
     """Sub-plants next to one of each plant."""
     members = int(np.clip(most, 1, _NEIGHBORS))
-    for p in np.unique(plant[own]):
-        kin = own[plant[own] == p]
+    for p in np.unique(plant[subplants]):
+        kin = subplants[plant[subplants] == p]
         away = np.linalg.norm(level.position[kin] - level.position[kin[np.argmin(mix(level.key[kin]))]], axis=1)
         yield kin[np.argsort(away, kind="stable")[:members]]
 
@@ -319,16 +319,16 @@ class SiblingGroups:
     pieces: Pieces | None  # of the branches, where only these count
 
     @classmethod
-    def of_subplants(cls, flora: Flora, some: Branches, beyond: Floats) -> Self:
+    def of_subplants(cls, flora: Flora, kin: Branches, beyond: Floats) -> Self:
         """Whole sub-plants."""
-        return cls(flora, some, beyond, subplant_totals(flora, some).optical_area, flora.one_leaf_area(some), None)
+        return cls(flora, kin, beyond, subplant_totals(flora, kin).optical_area, flora.one_leaf_area(kin), None)
 
     @classmethod
-    def of_branches(cls, flora: Flora, some: Branches, beyond: Floats) -> Self:
+    def of_branches(cls, flora: Flora, kin: Branches, beyond: Floats) -> Self:
         """Branches with their own leaves only."""
-        pieces, owner = open_subplants(flora, some)[2:]
-        area = np.bincount(owner, piece_totals(flora, pieces).optical_area, len(some))
-        return cls(flora, some, beyond, area, flora.one_leaf_area(some), pieces)
+        pieces, owner = open_subplants(flora, kin)[2:]
+        area = np.bincount(owner, piece_totals(flora, pieces).optical_area, len(kin))
+        return cls(flora, kin, beyond, area, flora.one_leaf_area(kin), pieces)
 
     @property
     def content(self) -> tuple[bytes, bool]:
@@ -389,9 +389,9 @@ def least_weights(view: View, facets: Facets) -> Floats:
     facet, step = spread(np.maximum(high - low + 1, 0))
     # On each line of the lattice, rays from where the last of the sides is entered to where the first is left.
     column = low[facet] + step
-    at, slope = by_x[:, facet] * (column - center[0][facet]), by_y[:, facet]
+    intercept, slope = by_x[:, facet] * (column - center[0][facet]), by_y[:, facet]
     with np.errstate(divide="ignore", invalid="ignore"):
-        ends = (largest - at) / slope
+        ends = (largest - intercept) / slope
     enter = np.where(slope < 0, ends, -np.inf).max(axis=0) + center[1][facet]
     leave = np.where(slope > 0, ends, np.inf).min(axis=0) + center[1][facet]
     first = np.ceil(np.where(enter <= leave, enter, 0.0)).astype(np.int64)
@@ -399,7 +399,7 @@ def least_weights(view: View, facets: Facets) -> Floats:
     line, step = spread(np.maximum(last - first + 1, 0))
     row = first[line] + step
     # How many times as large the triangle has to be to reach the ray.
-    scale = (at[:, line] + slope[:, line] * (row - center[1][facet[line]])).max(axis=0)
+    scale = (intercept[:, line] + slope[:, line] * (row - center[1][facet[line]])).max(axis=0)
     inside = np.flatnonzero(scale <= largest)  # a side along the line has neither been entered nor left
     ray, scale = _ray_numbers(column[line[inside]], row[inside]), scale[inside]
     order = np.argsort(ray, kind="stable")
@@ -458,20 +458,20 @@ def ages_measured(species: Species) -> list[float]:
     ages = ages_of(species)
     if ages.scaled or species.skeleton is not None:
         return [0.0]
-    found = [(part * ages.full, part * ages.full) for part in _YOUNG] + [(ages.full, 0.0)]
+    pairs = [(part * ages.full, part * ages.full) for part in _YOUNG] + [(ages.full, 0.0)]
     if np.isfinite(ages.lifespan):
-        found += [(y, y) for y in (part * ages.lifespan for part in _OLD) if y > ages.full]
-        found += [(y, y) for y in (ages.lifespan + after for after in _DEAD)]
-    return [years for _, years in sorted(found)]
+        pairs += [(y, y) for y in (part * ages.lifespan for part in _OLD) if y > ages.full]
+        pairs += [(y, y) for y in (ages.lifespan + after for after in _DEAD)]
+    return [years for _, years in sorted(pairs)]
 
 
 def needed(flora: Flora, number: int) -> list[tuple[Flora, int]]:
     """What has to be known for the weights of a species of a flora on its day, in summer or not."""
     asked: dict[tuple[Flora, int], None] = {}
 
-    def known(some: Flora, one: int) -> Floats:
-        asked[some, one] = None
-        return np.ones((2, int((some.rows["species"] == one).sum()), len(COUNTS)))
+    def known(compiled: Flora, one: int) -> Floats:
+        asked[compiled, one] = None
+        return np.ones((2, int((compiled.rows["species"] == one).sum()), len(COUNTS)))
 
     _weights_of(flora.in_leaf, number, _states_of(flora, number), known)
     return list(asked)
@@ -479,16 +479,16 @@ def needed(flora: Flora, number: int) -> list[tuple[Flora, int]]:
 
 def _weights_of(flora: Flora, number: int, states: tuple[int, ...], known: Known) -> Floats:
     """Weights (2, s, r, k) of a species of a flora in summer, in some states of `SHARES`; 1 in the others."""
-    own, rows = flora.species[number], flora.rows[flora.rows["species"] == number]
+    species, rows = flora.species[number], flora.rows[flora.rows["species"] == number]
     out = np.ones((2, max(states) + 1, len(rows), len(COUNTS)))
-    if own.aged is None:
+    if species.aged is None:
         for state in states:
-            out[:, state] = known(flora, number) if state == 0 else known(with_leaves(own, SHARES[state]), 0)
+            out[:, state] = known(flora, number) if state == 0 else known(with_leaves(species, SHARES[state]), 0)
         return out
-    described, years = own.aged
+    described, years = species.aged
 
-    def inverse(some: Flora) -> Floats:
-        return 1.0 / np.clip(known(some, 0)[:, _alike(rows, some.rows)], _LOWEST_WEIGHT, _HIGHEST_WEIGHT)
+    def inverse(compiled: Flora) -> Floats:
+        return 1.0 / np.clip(known(compiled, 0)[:, _alike(rows, compiled.rows)], _LOWEST_WEIGHT, _HIGHEST_WEIGHT)
 
     around, place = _around(described, years)
     ends = [inverse(compiled_at_age(described, one)) for one in around]
@@ -497,8 +497,8 @@ def _weights_of(flora: Flora, number: int, states: tuple[int, ...], known: Known
     full = compiled_at_age(described, 0.0)
     for state in sorted({*states} - {0}):
         # Leaves that are gone change as much of what hides behind others as when the plant is full-grown.
-        all_leaves, some = inverse(full), inverse(with_leaves(full.species[0], SHARES[state]))
-        left = np.clip((some - all_leaves) / np.maximum(all_leaves - 1.0, 0.05), -1.0, 0.5)
+        all_leaves, few_leaves = inverse(full), inverse(with_leaves(full.species[0], SHARES[state]))
+        left = np.clip((few_leaves - all_leaves) / np.maximum(all_leaves - 1.0, 0.05), -1.0, 0.5)
         less = grown + left * np.maximum(grown - 1.0, 0.05)
         out[:, state] = 1.0 / np.clip(less, 1.0 / _HIGHEST_WEIGHT, 1.0 / _LOWEST_WEIGHT)
     return out
@@ -522,11 +522,11 @@ def _alike(rows: Table, other: Table) -> Integers:
     """For each row (r,) of a species, that of a variant which is its order and the nearest part of it."""
     out = np.zeros(len(rows), np.int64)
     for order in np.unique(rows["order"]):
-        own, there = np.flatnonzero(rows["order"] == order), np.flatnonzero(other["order"] == order)
-        if not len(there):  # none of these branches yet, or no more
-            there = np.flatnonzero(other["order"] <= order)[-1:]
-        away = np.abs(rows["part"][own].mean(axis=1)[:, None] - other["part"][there].mean(axis=1))
-        out[own] = there[np.argmin(away, axis=1)]
+        parts, matches = np.flatnonzero(rows["order"] == order), np.flatnonzero(other["order"] == order)
+        if not len(matches):  # none of these branches yet, or no more
+            matches = np.flatnonzero(other["order"] <= order)[-1:]
+        away = np.abs(rows["part"][parts].mean(axis=1)[:, None] - other["part"][matches].mean(axis=1))
+        out[parts] = matches[np.argmin(away, axis=1)]
     return out
 
 

@@ -135,10 +135,10 @@ def light_ratios(flora: Flora, plants: Branches, facet: Floats, camera: Camera, 
         if light.kind != "SUN":
             away = np.maximum(np.linalg.norm(light.position - place, axis=1), 1e-9)
             toward = (light.position - place) / away[:, None]
-        own = np.broadcast_to(float(np.mean(light.color)) / away**2, len(place))
-        total += own * _balance(np.linalg.norm(eye - toward, axis=1), extinction, leaf, facet)
-        strength += own
-        strongest = np.where((own > most)[:, None], toward, strongest)
-        most = np.maximum(most, own)
-    there = np.maximum(strength, 1e-300)
-    return LightRatios(np.where(strength > 0.0, total / there, 1.0), strongest, most / there)
+        irradiance = np.broadcast_to(float(np.mean(light.color)) / away**2, len(place))
+        total += irradiance * _balance(np.linalg.norm(eye - toward, axis=1), extinction, leaf, facet)
+        strength += irradiance
+        strongest = np.where((irradiance > most)[:, None], toward, strongest)
+        most = np.maximum(most, irradiance)
+    divisor = np.maximum(strength, 1e-300)
+    return LightRatios(np.where(strength > 0.0, total / divisor, 1.0), strongest, most / divisor)

@@ -119,15 +119,15 @@ class FacetSites(Arrays):
         if thin is None:
             return self
         kept, times = thin(self.key, self.center, longer * CIRCUMRADIUS * np.sqrt(self.area))
-        some = self.take(kept)
-        return replace(some, area=times * some.area)
+        sites = self.take(kept)
+        return replace(sites, area=times * sites.area)
 
 
 def subplant_facets(flora: Flora, subplants: Branches, rules: FacetRules) -> Facets:
     """Facets of sub-plants (n), by rules of n."""
     leaves, wood = _leaves_of_subplants(flora, subplants, rules), _wood_of_subplants(flora, subplants, rules)
-    made = Facets.concatenate([leaves, wood])
-    return made.take(made.side > 0)
+    facets = Facets.concatenate([leaves, wood])
+    return facets.take(facets.side > 0)
 
 
 def piece_facets(flora: Flora, pieces: Pieces, rules: FacetRules, whole: Bearers | None = None) -> Facets:
@@ -150,14 +150,14 @@ def pushed_outside_view(facets: Facets, distance_to_view: Callable[[NDArray], ND
     if facets.stretch is not None:
         facets = replace(facets, stretch=np.clip(away / np.maximum(reach, 1e-12), 1.0, np.maximum(facets.stretch, 1.0)))
     short = reach - away
-    some = np.flatnonzero((short > 0.0) & (short < _MOST_MOVED * reach))
-    if len(some):
-        here, step = center[some], 0.1 * reach[some, None]
+    moved = np.flatnonzero((short > 0.0) & (short < _MOST_MOVED * reach))
+    if len(moved):
+        here, step = center[moved], 0.1 * reach[moved, None]
         slope = [distance_to_view(here + step * axis) - distance_to_view(here) for axis in np.eye(3)]
         slope = np.stack(slope, axis=1) / step
         steep = np.maximum(np.einsum("ni,ni->n", slope, slope), _LEAST_SLOPE)
         center = center.copy()
-        center[some] += (short[some] / steep)[:, None] * slope
+        center[moved] += (short[moved] / steep)[:, None] * slope
     fraction = np.clip(distance_to_view(center) / np.maximum(reach, 1e-12), 0.0, 1.0)
     return replace(facets, center=center, side=facets.side * fraction).take(np.flatnonzero(fraction > 0.0))
 
@@ -190,7 +190,7 @@ def _in_a_face(flora: Flora, row: NDArray, key: Keys, frame: NDArray) -> tuple[N
     return across, along
 
 
-def _at_samples(flora: Flora, points: Points, subplants: Branches, made: FacetSites) -> FacetSites:
+def _at_samples(flora: Flora, points: Points, subplants: Branches, sites: FacetSites) -> FacetSites:
     """Facets of sub-plants at samples: their places, and the axes of the sub-plants.
 
     Runs of samples are spread over a sub-plant, and each starts its run elsewhere. Where there are more facets than
@@ -198,10 +198,10 @@ def _at_samples(flora: Flora, points: Points, subplants: Branches, made: FacetSi
     in others places are moved a little.
     """
     first, number = points.runs(subplants)
-    owner, start = made.owner, (uniform(subplants.key, _START) * number).astype(np.int64)
-    pick = first[owner] + (start[owner] + made.index) % number[owner]
+    owner, start = sites.owner, (uniform(subplants.key, _START) * number).astype(np.int64)
+    pick = first[owner] + (start[owner] + sites.index) % number[owner]
     base = gathered(subplants.frame, owner)
-    again = made.index // number[owner]
+    again = sites.index // number[owner]
     whole = ((flora.rows["order"] == 0) & ~flora.rows["phantom"])[subplants.row]
     turn = None if subplants.crown is None else again * whole[owner] * GOLDEN_ANGLE
     place, share = placed_samples(flora, points, subplants, owner, pick, turn)
@@ -209,19 +209,19 @@ def _at_samples(flora: Flora, points: Points, subplants: Branches, made: FacetSi
     if again.any():
         _turned(base, again, np.flatnonzero((again > 0) & whole[owner]))
         moved = np.flatnonzero((again > 0) & ~whole[owner])
-        place[moved] += _MOVED * np.stack([signed(made.key[moved], _MOVE + axis) for axis in range(3)], axis=1)
+        place[moved] += _MOVED * np.stack([signed(sites.key[moved], _MOVE + axis) for axis in range(3)], axis=1)
     along = sum(base[:, :, k] * place[:, k, None] for k in range(3))
     place = gathered(subplants.position, owner) + subplants.length[owner, None] * along
-    area = made.area if share is None else made.area * share
-    return replace(made, area=area, row=points.row[pick], center=place, frame=base, sample=pick)
+    area = sites.area if share is None else sites.area * share
+    return replace(sites, area=area, row=points.row[pick], center=place, frame=base, sample=pick)
 
 
-def _turned(base: Floats, again: Integers, some: Integers) -> None:
+def _turned(base: Floats, again: Integers, index: Integers) -> None:
     """Turn some of rotations (m, 3, 3) about their third axes, in place, by as many golden angles as numbers (m,)."""
-    angle = again[some] * GOLDEN_ANGLE
+    angle = again[index] * GOLDEN_ANGLE
     c, s = np.cos(angle)[:, None], np.sin(angle)[:, None]
-    x, y = base[some, :, 0], base[some, :, 1]
-    base[some, :, 0], base[some, :, 1] = c * x + s * y, c * y - s * x
+    x, y = base[index, :, 0], base[index, :, 1]
+    base[index, :, 0], base[index, :, 1] = c * x + s * y, c * y - s * x
 
 
 def _leaves_of_subplants(flora: Flora, subplants: Branches, rules: FacetRules) -> Facets:
@@ -229,8 +229,8 @@ def _leaves_of_subplants(flora: Flora, subplants: Branches, rules: FacetRules) -
     several = np.isin(flora.species_of(subplants.row), flora.of_several_kinds)
     if subplants.year is None or not several.any():
         return _leaves_of_kind(flora, subplants, rules, flora.samples.leaves, None)
-    found = [(None, flora.samples, ~several), *((kind, own, several) for kind, own in flora.samples_by_kind.items())]
-    given = ((subplants.take(some), rules.take(some), own.leaves, kind) for kind, own, some in found)
+    kinds = [(None, flora.samples, ~several), *((kind, pool, several) for kind, pool in flora.samples_by_kind.items())]
+    given = ((subplants.take(chosen), rules.take(chosen), pool.leaves, kind) for kind, pool, chosen in kinds)
     return Facets.concatenate([_leaves_of_kind(flora, *one) for one in given])
 
 
@@ -238,38 +238,38 @@ def _leaves_of_kind(flora: Flora, subplants: Branches, rules: FacetRules, points
     rows, (path, draw) = flora.rows, _PATHS[True]
     one, all_ = flora.one_leaf_area(subplants, kind), flora.leaf_areas(subplants, kind)
     path += (kind or 0) << 32
-    made = facet_sites(subplants.key, all_, np.maximum(rules.leaf**2, one), path, draw, rules.explicit)
-    made = _at_samples(flora, points, subplants, made)
-    frame = products(made.frame, gathered(points.frame, made.sample).astype(np.float64))
-    frame = settled(rows, made.row, frame, points.light[made.sample].astype(np.float64), _SKY)
-    half_leaf = 0.5 * rows["leaf_size"][made.row, 0] * subplants.scale[made.owner]
-    made = replace(made, center=made.center + half_leaf[:, None] * frame[:, :, 1], frame=frame).thinned(rules.thin)
-    owner = made.owner
+    sites = facet_sites(subplants.key, all_, np.maximum(rules.leaf**2, one), path, draw, rules.explicit)
+    sites = _at_samples(flora, points, subplants, sites)
+    frame = products(sites.frame, gathered(points.frame, sites.sample).astype(np.float64))
+    frame = settled(rows, sites.row, frame, points.light[sites.sample].astype(np.float64), _SKY)
+    half_leaf = 0.5 * rows["leaf_size"][sites.row, 0] * subplants.scale[sites.owner]
+    sites = replace(sites, center=sites.center + half_leaf[:, None] * frame[:, :, 1], frame=frame).thinned(rules.thin)
+    owner = sites.owner
     # Sub-plants beyond the limbs know how far outside they are, which holds for all that grows on them.
-    outward = np.where(rows["outward"][subplants.row[owner]], points.outward[made.sample], subplants.outward[owner])
-    found = _leaf_facets(flora, subplants, made, rules, one, (outward, points.young[made.sample]))
-    return replace(found, velocity=_carried(flora, subplants, made))
+    outward = np.where(rows["outward"][subplants.row[owner]], points.outward[sites.sample], subplants.outward[owner])
+    facets = _leaf_facets(flora, subplants, sites, rules, one, (outward, points.young[sites.sample]))
+    return replace(facets, velocity=_carried(flora, subplants, sites))
 
 
 def _leaf_facets(
-    flora: Flora, branches: Branches, made: FacetSites, rules: FacetRules, one: Floats, places: tuple[Floats, Floats]
+    flora: Flora, branches: Branches, sites: FacetSites, rules: FacetRules, one: Floats, places: tuple[Floats, Floats]
 ) -> Facets:
     """Facets at rest at sites (m) at leaves of branches (n).
 
     A leaf of these has an area ``one`` (n,), m²; ``places`` (m,) are those between inside and outside and on the shoot.
     """
-    row, owner = made.row, made.owner
-    across, along = _in_a_face(flora, row, made.key, made.frame)
-    many = made.area / one.clip(1e-300)[owner]
+    row, owner = sites.row, sites.owner
+    across, along = _in_a_face(flora, row, sites.key, sites.frame)
+    many = sites.area / one.clip(1e-300)[owner]
     weight, dull, lit = rules.weights(owner), flora.leaf.dull[row], rules.lit
-    color = cluster_color(_leaf_colors(flora, branches, made, many, *places), GLOSS * (1.0 - dull), weight)
+    color = cluster_color(_leaf_colors(flora, branches, sites, many, *places), GLOSS * (1.0 - dull), weight)
     if lit is not None:
         color = lit.colors(color, owner, np.cross(across, along), many)
     # What is mirrored and meets another leaf is lost as such.
     left = np.minimum(weight if lit is None else weight * lit.hotspot[owner], 1.0)
-    side, stretch = np.sqrt(made.area * weight), np.ones(len(owner))
+    side, stretch = np.sqrt(sites.area * weight), np.ones(len(owner))
     look = color, flora.leaf.transmission[row]
-    return Facets(made.center, across, along, side, *look, stretch=stretch, dull=1.0 - left * (1.0 - dull))
+    return Facets(sites.center, across, along, side, *look, stretch=stretch, dull=1.0 - left * (1.0 - dull))
 
 
 def _leaves_of_pieces(flora: Flora, pieces: Pieces, rules: FacetRules, whole: Bearers | None) -> Facets:
@@ -281,64 +281,64 @@ def _leaves_of_pieces(flora: Flora, pieces: Pieces, rules: FacetRules, whole: Be
         shown, number = flora.day.left(branches, rows["leaf_kind"][row], AREA, PRESENT)
         one = one * shown / np.maximum(number, 1e-300)
     facet, areas = np.maximum(rules.leaf**2, one), piece_leaves(flora, pieces)[1]
-    made = _along(flora, pieces, areas, facet, leaf_start(rows, branches), True, rules.explicit)
+    sites = _along(flora, pieces, areas, facet, leaf_start(rows, branches), True, rules.explicit)
     if whole is None:
-        bearers = np.flatnonzero(np.bincount(made.owner, minlength=len(branches)))  # many pieces get no facet
-        own, of = branches.take(bearers), np.searchsorted(bearers, made.owner)
-        lines = axes(rows, own)
+        bearers = np.flatnonzero(np.bincount(sites.owner, minlength=len(branches)))  # many pieces get no facet
+        shoots, of = branches.take(bearers), np.searchsorted(bearers, sites.owner)
+        lines = axes(rows, shoots)
     else:
-        own, lines, of = whole[0].branches, whole[0].lines, whole[1][made.owner]
-    leaves = place_leaves(rows, own, lines, of, made.index, made.key, made.t)
-    frame = settled(rows, made.row, leaves.frame, leaves.light, leaves.sky)
+        shoots, lines, of = whole[0].branches, whole[0].lines, whole[1][sites.owner]
+    leaves = place_leaves(rows, shoots, lines, of, sites.index, sites.key, sites.t)
+    frame = settled(rows, sites.row, leaves.frame, leaves.light, leaves.sky)
     center = leaves.position + 0.5 * leaves.size[:, None] * frame[:, :, 1]
-    made = replace(made, center=center, frame=frame, leaves=leaves)
-    made = made.thinned(None if rows["envelope"][row].any() else rules.thin)
-    places, velocity = (outwardness(rows, branches, made.owner, made.t), youth(rows, made.row, made.t)), None
-    if own.later is not None:
-        there = place_leaves(rows, own.moved(), lines.later, made.leaves.branch, made.index, made.key, made.t)
-        velocity = (there.position - made.leaves.position) / moment(rows)
-    return replace(_leaf_facets(flora, branches, made, rules, one, places), velocity=velocity)
+    sites = replace(sites, center=center, frame=frame, leaves=leaves)
+    sites = sites.thinned(None if rows["envelope"][row].any() else rules.thin)
+    places, velocity = (outwardness(rows, branches, sites.owner, sites.t), youth(rows, sites.row, sites.t)), None
+    if shoots.later is not None:
+        later = place_leaves(rows, shoots.moved(), lines.later, sites.leaves.branch, sites.index, sites.key, sites.t)
+        velocity = (later.position - sites.leaves.position) / moment(rows)
+    return replace(_leaf_facets(flora, branches, sites, rules, one, places), velocity=velocity)
 
 
 def _wood_of_subplants(flora: Flora, subplants: Branches, rules: FacetRules) -> Facets:
     points, wood = flora.samples.wood, flora.wood_areas(subplants) / 2
-    made = facet_sites(subplants.key, wood, rules.wood_side**2, *_PATHS[False], rules.explicit)
-    made = _at_samples(flora, points, subplants, made).thinned(rules.thin, STRETCH)
-    axis = np.einsum("nij,nj->ni", made.frame, points.frame[made.sample, :, 2].astype(np.float64))
-    return _strips(flora, made, rules, axis, _carried(flora, subplants, made))
+    sites = facet_sites(subplants.key, wood, rules.wood_side**2, *_PATHS[False], rules.explicit)
+    sites = _at_samples(flora, points, subplants, sites).thinned(rules.thin, STRETCH)
+    axis = np.einsum("nij,nj->ni", sites.frame, points.frame[sites.sample, :, 2].astype(np.float64))
+    return _strips(flora, sites, rules, axis, _carried(flora, subplants, sites))
 
 
 def _wood_of_pieces(flora: Flora, pieces: Pieces, rules: FacetRules) -> Facets:
     none, wood = np.zeros(len(pieces)), wood_areas(flora, pieces) / 2
-    made = _along(flora, pieces, wood, rules.wood_side**2, none, False, None)
-    owner, t, velocity = made.owner, made.t, None
+    sites = _along(flora, pieces, wood, rules.wood_side**2, none, False, None)
+    owner, t, velocity = sites.owner, sites.t, None
     part = (t - pieces.t0[owner]) / np.maximum(pieces.t1 - pieces.t0, 1e-12)[owner]
     span = (pieces.end - pieces.start)[owner]
     if pieces.branches.later is not None:
         lines = axes(flora.rows, pieces.branches)
         velocity = (lines.later.at(owner, t)[0] - lines.at(owner, t)[0]) / moment(flora.rows)
-    made = replace(made, center=pieces.start[owner] + part[:, None] * span)
-    return _strips(flora, made, rules, unit(span), velocity)
+    sites = replace(sites, center=pieces.start[owner] + part[:, None] * span)
+    return _strips(flora, sites, rules, unit(span), velocity)
 
 
-def _strips(flora: Flora, made: FacetSites, rules: FacetRules, axis: Floats, velocity: Floats | None) -> Facets:
+def _strips(flora: Flora, sites: FacetSites, rules: FacetRules, axis: Floats, velocity: Floats | None) -> Facets:
     """Facets of wood: long and thin, as branches are, along axes (m, 3)."""
     stretch, none = np.full(len(axis), STRETCH), np.zeros(len(axis))
     # Turned about their axes at random, since closed tubes face all ways around.
-    aside, turn = perpendicular(axis), 2 * np.pi * uniform(made.key, _TURN)[:, None]
-    across, weight = np.cos(turn) * aside + np.sin(turn) * np.cross(axis, aside), rules.weights(made.owner)
-    look = cluster_color(flora.rows["branch_color"][made.row, 0], none, weight), none, velocity
-    return Facets(made.center, across, axis, np.sqrt(made.area * weight), *look, stretch=stretch, dull=none)
+    aside, turn = perpendicular(axis), 2 * np.pi * uniform(sites.key, _TURN)[:, None]
+    across, weight = np.cos(turn) * aside + np.sin(turn) * np.cross(axis, aside), rules.weights(sites.owner)
+    look = cluster_color(flora.rows["branch_color"][sites.row, 0], none, weight), none, velocity
+    return Facets(sites.center, across, axis, np.sqrt(sites.area * weight), *look, stretch=stretch, dull=none)
 
 
-def _carried(flora: Flora, subplants: Branches, made: FacetSites) -> Floats | None:
+def _carried(flora: Flora, subplants: Branches, sites: FacetSites) -> Floats | None:
     """Velocities (m, 3) of facets of sub-plants that move with their bases; None for plants at rest."""
     if subplants.later is None:
         return None
-    own = subplants.take(made.owner)
-    local = np.einsum("nji,nj->ni", own.frame, made.center - own.position)
-    there = own.later.position + np.einsum("nij,nj->ni", own.later.frame, local)
-    return (there - made.center) / moment(flora.rows)
+    owners = subplants.take(sites.owner)
+    local = np.einsum("nji,nj->ni", owners.frame, sites.center - owners.position)
+    later = owners.later.position + np.einsum("nij,nj->ni", owners.later.frame, local)
+    return (later - sites.center) / moment(flora.rows)
 
 
 def _along(
@@ -357,22 +357,22 @@ def _along(
     length = np.maximum(pieces.t1 - first, 0.0)
     part = np.where(length > 0, np.maximum(high - low, length) / np.maximum(length, 1e-12), 0.0)
     numbered = mix(pieces.branches.key ^ (number.astype(np.uint64) + np.uint64(_PATHS[leafy][0])))
-    made = facet_sites(numbered, area * part, facet, *_PATHS[leafy], explicit)
-    owner = made.owner
-    t = low[owner] + (high - low)[owner] * ((uniform(numbered, _PLACE)[owner] + made.index * _GOLDEN) % 1.0)
-    made = replace(made, t=t, row=pieces.branches.row[owner])
-    return made.take(np.flatnonzero((t >= first[owner]) & (t < pieces.t1[owner])))
+    sites = facet_sites(numbered, area * part, facet, *_PATHS[leafy], explicit)
+    owner = sites.owner
+    t = low[owner] + (high - low)[owner] * ((uniform(numbered, _PLACE)[owner] + sites.index * _GOLDEN) % 1.0)
+    sites = replace(sites, t=t, row=pieces.branches.row[owner])
+    return sites.take(np.flatnonzero((t >= first[owner]) & (t < pieces.t1[owner])))
 
 
-def _leaf_colors(flora: Flora, branches: Branches, made: FacetSites, leaves: Floats, *places: Floats) -> Floats:
+def _leaf_colors(flora: Flora, branches: Branches, sites: FacetSites, leaves: Floats, *places: Floats) -> Floats:
     """Colors (m, 3) of facets that stand for several leaves (m,) of branches each: a mean varies less than one leaf."""
-    several, row = np.sqrt(np.maximum(leaves, 1)), made.row
-    deviation = signed(made.key, Draw.LEAF_COLOR) / several
+    several, row = np.sqrt(np.maximum(leaves, 1)), sites.row
+    deviation = signed(sites.key, Draw.LEAF_COLOR) / several
     mean = mean_leaf_colors(flora.rows, row, *places)
     if branches.year is not None:
-        summer, mean = mean, flora.day.own_colors(branches, flora.rows["leaf_kind"][row], mean, made.owner)
-        day, hue = (gathered(branches.year[:, i], made.owner) for i in range(2))
-        stages = leaf_stages(flora.rows, row, made.key, day)
+        summer, mean = mean, flora.day.own_colors(branches, flora.rows["leaf_kind"][row], mean, sites.owner)
+        day, hue = (gathered(branches.year[:, i], sites.owner) for i in range(2))
+        stages = leaf_stages(flora.rows, row, sites.key, day)
         one = leaf_colors_at(flora.rows, row, summer, stages, hue)
         mean = mean + np.where(stages.there, 1.0 / several, 0.0)[:, None] * (one - mean)
     return np.clip(mean + gathered(flora.rows["leaf_color"][:, 1], row) * deviation[:, None], 0, 1)
@@ -412,32 +412,32 @@ def facets_of_assets(
     A fraction (n,) of them is left out.
     """
     weight = asset_weights(placed, parts, totals.optical_area / np.maximum(leaf, 1e-12) ** 2)
-    key, made = placed.keys(parts), []
+    key, facets = placed.keys(parts), []
     for leafy, area, side in ((True, totals.leaf_area, leaf), (False, totals.wood_area / 2, wood)):
-        own = facet_sites(key, area, side**2, *_ASSET_PATHS[leafy], left_out)
-        sample = placed.picked(parts, key, leafy, own.owner, own.index)
-        made.append(_placed(placed, parts, replace(own, sample=sample), leafy, weight[own.owner]))
-    return Facets.concatenate(made)
+        sites = facet_sites(key, area, side**2, *_ASSET_PATHS[leafy], left_out)
+        sample = placed.picked(parts, key, leafy, sites.owner, sites.index)
+        facets.append(_placed(placed, parts, replace(sites, sample=sample), leafy, weight[sites.owner]))
+    return Facets.concatenate(facets)
 
 
-def _placed(placed: PlacedAssets, parts: AssetParts, made: FacetSites, leafy: bool, weight: Floats) -> Facets:
+def _placed(placed: PlacedAssets, parts: AssetParts, sites: FacetSites, leafy: bool, weight: Floats) -> Facets:
     """Facets (m) of clusters: each at a sample, turned about its normal as may be."""
     samples, clusters = placed.assets.samples, placed.assets.clusters
-    pick, key, instance = made.sample, made.key, parts.instance[made.owner]
-    center, side = placed.to_world(samples.position[pick], instance), np.sqrt(made.area * weight)
+    pick, key, instance = sites.sample, sites.key, parts.instance[sites.owner]
+    center, side = placed.to_world(samples.position[pick], instance), np.sqrt(sites.area * weight)
     local = samples.normal[pick].astype(np.float64)
-    linear, some = placed.instances.linear, placed.stretched[instance]
+    linear, stretched = placed.instances.linear, placed.stretched[instance]
     normal = np.zeros_like(center)
     for i in range(3):
         for k in range(3):
             normal[:, i] += linear[instance, i, k] * local[:, k]
-    if some.any():
-        at = np.flatnonzero(some)
-        normal[at] = np.einsum("nij,nj->ni", placed.cofactors(instance[at]), local[at])
+    if stretched.any():
+        index = np.flatnonzero(stretched)
+        normal[index] = np.einsum("nij,nj->ni", placed.cofactors(instance[index]), local[index])
         # Faces of one cluster grow by different factors, and so do their facets.
-        owner, cluster = made.owner[at], parts.cluster[made.owner[at]]
+        owner, cluster = sites.owner[index], parts.cluster[sites.owner[index]]
         mean = parts.totals.area[owner] / (clusters.leaf_area[cluster] + clusters.wood_area[cluster])
-        side[at] *= np.sqrt(np.linalg.norm(normal[at], axis=1) / mean)
+        side[index] *= np.sqrt(np.linalg.norm(normal[index], axis=1) / mean)
     normal = unit(normal)
     across = perpendicular(normal)
     turn = 2 * np.pi * uniform(key, _ASSET_TURN)[:, None]
@@ -445,7 +445,7 @@ def _placed(placed: PlacedAssets, parts: AssetParts, made: FacetSites, leafy: bo
     along = np.cross(normal, across)
     # Where there are more facets than samples, none may lie upon another.
     number = (clusters.leaf_samples if leafy else clusters.wood_samples)[parts.cluster]
-    again = np.flatnonzero(made.index >= number[made.owner])
+    again = np.flatnonzero(sites.index >= number[sites.owner])
     if len(again):
         for axis, by in ((across, _ASSET_MOVE), (along, _ASSET_MOVE + 1)):
             center[again] += (_ASSET_MOVED * side[again] * signed(key[again], by))[:, None] * axis[again]

@@ -97,7 +97,7 @@ def joined(parts: Sequence[_Drawn]) -> _Drawn:
 def shape_buffers(shapes: DrawnShapes) -> MeshBuffers | PointBuffers:
     """A mesh of triangles, or spheres as points, with the attributes that the material of proxies reads."""
     names = ("color", "transmission", "roughness", "dull")
-    looks = {f"tf_{name}": own for name in names if (own := getattr(shapes, name)) is not None}
+    looks = {f"tf_{name}": column for name in names if (column := getattr(shapes, name)) is not None}
     if shapes.radius is not None:
         still = shapes.velocity is None
         return PointBuffers(shapes.place, shapes.radius, looks if still else {**looks, "velocity": shapes.velocity})

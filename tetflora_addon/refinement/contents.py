@@ -120,7 +120,7 @@ def sums(totals: Totals, cells: Integers, number: int) -> Totals:
     """Totals of each of a number of cells, from those (n,) of the things in ``cells`` (n,); the width is a mean."""
     area, width, large = totals.area, totals.width, ~np.isfinite(totals.width)
     if large.any():
-        area, width = (np.where(large, 0.0, own) for own in (area, width))
+        area, width = (np.where(large, 0.0, measure) for measure in (area, width))
     total = np.bincount(cells, area, number)
     width = np.bincount(cells, area * width, number) / np.where(total > 0, total, 1)
     only_large = (total == 0) & (np.bincount(cells[large], minlength=number) > 0)
@@ -214,12 +214,12 @@ class PolygonsByCell(Chunks[InCells[Polygons]]):
 
     def totals(self, chosen: Mask) -> list[tuple[Totals, Integers32]]:
         """Totals of polygons in chosen nodes, a mask (nodes,), and their nodes; one pair for each chunk."""
-        some = [chunk.take(chosen[chunk.cell] & there) for chunk, there in self.chunks()]
-        return [(part.totals, part.cell) for part in some]
+        parts = [chunk.take(chosen[chunk.cell] & present) for chunk, present in self.chunks()]
+        return [(part.totals, part.cell) for part in parts]
 
     def take_within(self, chosen: Mask) -> InCells[Polygons]:
         """Remove and return what lies in chosen nodes; ``chosen`` is (nodes,) bool."""
-        within = [chosen[chunk.cell] & there for chunk, there in self.chunks()]
+        within = [chosen[chunk.cell] & present for chunk, present in self.chunks()]
         out = self.take_out(np.flatnonzero(np.concatenate(within)))
         if self.marked > len(self):  # copying what stays each time would cost more than all else that moves
             self.joined()
@@ -277,17 +277,17 @@ def _cut(polygons: Polygons, planes: Floats, slack: Floats | float = 0.0) -> tup
     low, high = distance.min(axis=1, initial=np.inf), distance.max(axis=1, initial=-np.inf)
     loose = np.broadcast_to(slack, len(polygons))[owner]
     crosses = np.minimum(-low, high) > np.maximum(loose, whole.touching())
-    stays, some = np.flatnonzero(~crosses), np.flatnonzero(crosses)
-    positive = distance[some] >= 0
+    stays, crossing = np.flatnonzero(~crosses), np.flatnonzero(crosses)
+    positive = distance[crossing] >= 0
     # The corner that is alone on its side comes first.
     alone = np.where(positive.sum(axis=1) == 1, positive.argmax(axis=1), positive.argmin(axis=1))
     turn = (alone[:, None] + np.arange(3)) % 3
-    w = np.take_along_axis(whole.weights[some], turn[:, :, None], axis=1)
-    d = np.take_along_axis(distance[some], turn, axis=1)
+    w = np.take_along_axis(whole.weights[crossing], turn[:, :, None], axis=1)
+    d = np.take_along_axis(distance[crossing], turn, axis=1)
     first, second = (
         w[:, 0] + (w[:, k] - w[:, 0]) * np.clip(d[:, :1] / (d[:, :1] - d[:, k : k + 1]), 0.0, 1.0) for k in (1, 2)
     )
-    made = np.concatenate(
+    weights = np.concatenate(
         [
             np.stack([w[:, 0], first, second], axis=1),
             np.stack([first, w[:, 1], w[:, 2]], axis=1),
@@ -295,10 +295,10 @@ def _cut(polygons: Polygons, planes: Floats, slack: Floats | float = 0.0) -> tup
         ]
     )
     sides = (d[:, 0] >= 0).astype(np.int64)
-    from_, side = np.tile(some, 3), np.concatenate([sides, 1 - sides, 1 - sides])
-    kept = np.flatnonzero(area_fractions(made) > 0)  # a cut through a corner leaves pieces of no size
-    made, from_, side = made[kept], from_[kept], side[kept]
-    new = Polygons.fragments(polygons.meshes, whole.face[from_], whole.instance[from_], whole.triangle[from_], made)
+    from_, side = np.tile(crossing, 3), np.concatenate([sides, 1 - sides, 1 - sides])
+    kept = np.flatnonzero(area_fractions(weights) > 0)  # a cut through a corner leaves pieces of no size
+    weights, from_, side = weights[kept], from_[kept], side[kept]
+    new = Polygons.fragments(polygons.meshes, whole.face[from_], whole.instance[from_], whole.triangle[from_], weights)
     larger = (high[stays] >= -low[stays]).astype(np.int64)
     parts = Polygons.concatenate([whole.take(stays), new])
     return np.concatenate([owner[stays], owner[from_]]), np.concatenate([larger, side]), parts
@@ -312,8 +312,8 @@ def sort_into_children(tree: TetrahedralTree, held: InCells[Polygons], slack: Sl
     placed = [InCells.none(Polygons)]
     while len(held):
         polygons, cells, crosses = held.items, held.cell.copy(), np.zeros(len(held), bool)
-        for some in chunks(polygons.triangle_counts, DESCEND_BATCH):
-            cells[some], crosses[some] = _lowered(tree, polygons.take(some), cells[some], slack)
+        for run in chunks(polygons.triangle_counts, DESCEND_BATCH):
+            cells[run], crosses[run] = _lowered(tree, polygons.take(run), cells[run], slack)
         placed.append(replace(held, cell=cells).take(~crosses))
         polygons, cells, width = polygons.take(crosses), cells[crosses], held.totals.width[crosses]
         owner, side, polygons = _cut(polygons, tree.planes(cells), slack(polygons.center))
@@ -332,16 +332,16 @@ def _lowered(tree: TetrahedralTree, polygons: Polygons, cells: NDArray, slack: S
         whole = np.abs(distance) > np.take(reach, moving)
         # The sphere is a first guess; slack and corners are computed only for what it leaves open.
         unclear = np.flatnonzero(~whole)
-        some = moving[unclear]
-        loose = np.maximum(touching[some], slack(center[some]))
-        whole[unclear] = np.abs(distance[unclear]) > reach[some] - loose
+        close = moving[unclear]
+        loose = np.maximum(touching[close], slack(center[close]))
+        whole[unclear] = np.abs(distance[unclear]) > reach[close] - loose
         left = np.flatnonzero(~whole[unclear])
         if len(left):
-            low, high = polygons.take(some[left]).distances(planes[unclear[left]])
+            low, high = polygons.take(close[left]).distances(planes[unclear[left]])
             whole[unclear[left]] = np.minimum(-low, high) <= loose[left]
             distance[unclear[left]] = high + low  # the larger part says where it goes
         crosses[moving[~whole]] = True
         moving, side = moving[whole], (distance[whole] >= 0).astype(np.int64)
-        cells[moving] = at = tree.children[cells[moving], side]
-        moving = moving[tree.children[at, 0] >= 0]
+        cells[moving] = nodes = tree.children[cells[moving], side]
+        moving = moving[tree.children[nodes, 0] >= 0]
     return cells, crosses

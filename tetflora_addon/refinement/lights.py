@@ -197,27 +197,27 @@ def shadows_of(
             buffer = AlphaBuffer(view, settings.visibility_resolution)
             buffer.add(np.arange(count), vertices, extinction)
             lit = buffer.transmittance(tree.order(**view.line_of_sight)[cells.nodes])
-            found = tetrahedron_fragments(vertices, view, *size)
-            field, fields = _fields(found.pixel, size)
+            fragments = tetrahedron_fragments(vertices, view, *size)
+            field, fields = _fields(fragments.pixel, size)
             far, fine = np.zeros(fields), np.full(fields, np.inf)
-            seen = ~hidden[found.cell]
-            np.maximum.at(far, field[seen], (found.entry + found.thickness)[seen])
-            np.minimum.at(fine, field[seen], receiving[1][found.cell[seen]])
+            seen = ~hidden[fragments.cell]
+            np.maximum.at(far, field[seen], (fragments.entry + fragments.thickness)[seen])
+            np.minimum.at(fine, field[seen], receiving[1][fragments.cell[seen]])
             _receive(view, size, points, receiving[0], far, fine)
-            casts = np.flatnonzero(~seen & (far[field] > found.entry) & (lit[found.cell] > settings.hidden))
-            cell, at = found.cell[casts], field[casts]
-            middle = found.entry[casts] + found.thickness[casts] / 2.0
+            casts = np.flatnonzero(~seen & (far[field] > fragments.entry) & (lit[fragments.cell] > settings.hidden))
+            cell, shaded = fragments.cell[casts], field[casts]
+            middle = fragments.entry[casts] + fragments.thickness[casts] / 2.0
             # Detail that is smaller than the penumbra is not seen, however large the image is.
             if light.kind == "SUN":
-                blur = light.width * (far[at] - middle)
+                blur = light.width * (far[shaded] - middle)
                 across = view.pixel_size * view.width / size[0]
             else:
-                blur = light.width * (far[at] - middle) / np.maximum(middle, view.near)
-                across = view.pixel_size * view.width / size[0] * far[at]
-            extent = np.maximum(fine[at], np.maximum(blur, 0.0) / settings.shadow_cutoff)
-            pixels += np.bincount(cell, found.coverage[casts] * lit[cell] * (across / extent) ** 2, count)
+                blur = light.width * (far[shaded] - middle) / np.maximum(middle, view.near)
+                across = view.pixel_size * view.width / size[0] * far[shaded]
+            extent = np.maximum(fine[shaded], np.maximum(blur, 0.0) / settings.shadow_cutoff)
+            pixels += np.bincount(cell, fragments.coverage[casts] * lit[cell] * (across / extent) ** 2, count)
             # A light that is close throws large shadows.
-            larger = 1.0 if light.kind == "SUN" else far[at] / np.maximum(middle, view.near)
+            larger = 1.0 if light.kind == "SUN" else far[shaded] / np.maximum(middle, view.near)
             np.maximum.at(feature, cell, cells.totals.width[cell] * larger / extent)
     return Shadows(pixels, feature)
 
@@ -228,7 +228,7 @@ def seen_ground(camera: Camera, occluders: Floats | None, height: float) -> Floa
     All in meters, world space.
     """
     views = face_cameras(camera, GROUND // 2) if camera.kind == "PANO" else [camera]
-    found = []
+    points = []
     for view in views:
         size = buffer_size(view, GROUND if len(views) == 1 else GROUND // 2)
         origins, directions = pixel_rays(view, *size)
@@ -238,9 +238,9 @@ def seen_ground(camera: Camera, occluders: Floats | None, height: float) -> Floa
         if occluders is not None and len(occluders):
             hit = occluder_depth(occluders, view, *size)
             level = np.where(np.isfinite(hit), hit, level)
-        some = np.flatnonzero(level < camera.far)
-        found.append(origins[some] + level[some, None] * directions[some])
-    return np.concatenate(found)
+        rays = np.flatnonzero(level < camera.far)
+        points.append(origins[rays] + level[rays, None] * directions[rays])
+    return np.concatenate(points)
 
 
 def _fields(pixel: Integers, size: tuple[int, int]) -> tuple[Integers, int]:
@@ -253,11 +253,11 @@ def _fields(pixel: Integers, size: tuple[int, int]) -> tuple[Integers, int]:
 def _receive(view: Camera, size: tuple[int, int], points: Floats, extent: Floats, far: Floats, fine: Floats) -> None:
     """Put points that receive light into the fields: how far away they are, and how fine the image is there."""
     place, depth, meters = image_places(view, points, size)
-    some = np.flatnonzero((depth > view.near) & (place >= 0.0).all(axis=1) & (place < size).all(axis=1))
-    column, row = place[some].astype(np.int64).T
+    inside = np.flatnonzero((depth > view.near) & (place >= 0.0).all(axis=1) & (place < size).all(axis=1))
+    column, row = place[inside].astype(np.int64).T
     field, _ = _fields(row * size[0] + column, size)
-    np.maximum.at(far, field, meters[some])
-    np.minimum.at(fine, field, extent[some])
+    np.maximum.at(far, field, meters[inside])
+    np.minimum.at(fine, field, extent[inside])
 
 
 #: Places along a shadow that are looked at; they lie the farther apart the longer it is.
@@ -286,12 +286,12 @@ class ShadowReach:
         reach = np.broadcast_to(reach, len(points))
         if not any(light.shadow for light in self.lights):
             return _UNKNOWN * np.maximum(distance_to_view, 0.0)
-        found = np.where(distance_to_view > 0.0, np.inf, 0.0)
+        shortest = np.where(distance_to_view > 0.0, np.inf, 0.0)
         outside = np.flatnonzero(distance_to_view > 0.0)
         for light in self.lights:
             if len(outside) and light.shadow:
-                found[outside] = np.minimum(found[outside], self._of(light, points[outside], reach[outside]))
-        return np.maximum(found, np.maximum(distance_to_view, 0.0))
+                shortest[outside] = np.minimum(shortest[outside], self._of(light, points[outside], reach[outside]))
+        return np.maximum(shortest, np.maximum(distance_to_view, 0.0))
 
     def _of(self, light: Light, points: Floats, reach: Floats) -> Floats:
         if light.kind == "SUN":
@@ -303,11 +303,11 @@ class ShadowReach:
         with np.errstate(divide="ignore", invalid="ignore"):
             down = np.where(ray[:, 2] < 0.0, (self.floor - points[:, 2] - reach) / ray[:, 2], np.inf)
         longest = np.clip(down, _FIRST, _LONGEST)
-        found, before = np.full(len(points), np.inf), np.zeros(len(points))
+        shortest, before = np.full(len(points), np.inf), np.zeros(len(points))
         for step in range(1, _STEPS + 1):
             fallen = _FIRST * (longest / _FIRST) ** (step / _STEPS)
             # A place stands for the way from the one before.
             near = self.camera.distance_to_view(points + fallen[:, None] * ray) <= (fallen - before) / 2.0 + reach
-            found = np.where(near, np.minimum(found, fallen), found)
+            shortest = np.where(near, np.minimum(shortest, fallen), shortest)
             before = fallen
-        return found
+        return shortest

@@ -174,8 +174,8 @@ def outliers_of(
     center, reach = seeds.position, np.zeros(len(seeds))
     plants_end = assets_end = len(seeds)
     if placed is not None and len(placed):
-        own = placed.wholes()
-        center, reach = np.concatenate([center, own.center]), np.append(reach, own.reach)
+        wholes = placed.wholes()
+        center, reach = np.concatenate([center, wholes.center]), np.append(reach, wholes.reach)
         assets_end += len(placed)
     if polygons is not None and len(polygons):
         number = len(polygons.meshes.surface)
@@ -185,14 +185,14 @@ def outliers_of(
         others = (low + high) / 2.0, np.linalg.norm(high - low, axis=1) / 2.0
         center, reach = np.concatenate([center, others[0]]), np.append(reach, others[1])
     away = np.linalg.norm(center - camera.eye, axis=1)
-    some = far_off(away - reach)
-    plants = some[some < plants_end]
+    far = far_off(away - reach)
+    plants = far[far < plants_end]
     if len(plants):
         reach[plants] = PlantParts.of_subplants(flora, trunks(flora.rows, seeds.take(plants))).extent
     for eye in (camera, *camera.shutter):
-        some = some[_unseen(eye, center[some], reach[some], away[some])]
-    own, last = some < plants_end, some >= assets_end
-    return Outliers(some[own], some[~own & ~last] - plants_end, some[last] - assets_end, away[some])
+        far = far[_unseen(eye, center[far], reach[far], away[far])]
+    first, last = far < plants_end, far >= assets_end
+    return Outliers(far[first], far[~first & ~last] - plants_end, far[last] - assets_end, away[far])
 
 
 def far_off(away: Floats) -> Integers:
@@ -325,10 +325,10 @@ def refine(
     settings = replace(settings, visibility_resolution=min(settings.visibility_resolution, pixels))
     camera = widened_for(camera, settings.margin, flora, plants.parts.branches, polygons, assets.parts)
     slack = _slack(camera, settings.visibility_resolution)
-    own = in_the_root(polygons, large_polygons(polygons, camera))
+    held = in_the_root(polygons, large_polygons(polygons, camera))
     bounds = _bounds(flora, plants, assets, polygons)
     tree = world_root(bounds, camera.origin) if is_anchored(camera, settings) else view_root(camera, bounds)
-    cell_polygons, most = PolygonsByCell(sort_into_children(tree, own, slack)), MOST_FRAGMENTS + 2 * len(own)
+    cell_polygons, most = PolygonsByCell(sort_into_children(tree, held, slack)), MOST_FRAGMENTS + 2 * len(held)
     divided = np.arange(len(tree)) == 0
     shared = plants, assets
     for kind in shared:
@@ -370,8 +370,8 @@ def refine(
             splitting &= ~barred
         clock.lap("refinement")
         ranks, seconds = rank[cells.nodes], dict(clock.seconds)
-        found = cells, transmittance, decision, ranks, passes, not limited, seconds, outliers, lights, polygons
-        state = Refinement(tree, plants, assets, cell_polygons, *found)
+        outcome = cells, transmittance, decision, ranks, passes, not limited, seconds, outliers, lights, polygons
+        state = Refinement(tree, plants, assets, cell_polygons, *outcome)
         if not splitting.any():
             return state
         if (yield state):
@@ -386,7 +386,7 @@ def refine(
         edge[parents] = np.sqrt(squared_edges(tree.vertices(parents)).max(axis=1))
         may_cut = len(cell_polygons) <= most
         new = sort_into_children(
-            tree, cell_polygons.take_within(dividing), slack if may_cut else lambda at: np.full(len(at), np.inf)
+            tree, cell_polygons.take_within(dividing), slack if may_cut else lambda points: np.full(len(points), np.inf)
         )
         cell_polygons.append(new)
         changed = plants.update(tree, dividing, edge) | assets.update(tree, dividing, edge)
@@ -401,8 +401,8 @@ def refine(
 def _bounds(flora: Flora, plants: SharedPlants, assets: SharedAssets, polygons: Polygons) -> Floats:
     """Axis-aligned box (2, 3) of all that is there, meters."""
     boxes = [bounding_box(flora, plants.parts.branches)] if len(plants.parts) else []
-    for own in filter(len, (assets.parts, polygons)):
-        boxes.append(((own.center.T - own.reach).min(axis=1), (own.center.T + own.reach).max(axis=1)))
+    for group in filter(len, (assets.parts, polygons)):
+        boxes.append(((group.center.T - group.reach).min(axis=1), (group.center.T + group.reach).max(axis=1)))
     return np.stack([np.min([low for low, _ in boxes], axis=0), np.max([high for _, high in boxes], axis=0)])
 
 
@@ -410,8 +410,8 @@ def _filled(
     tree: TetrahedralTree, shared: Sequence[SharedParts], cell_polygons: PolygonsByCell, changed: Mask
 ) -> tuple[Integers, Totals]:
     """Nodes (n,) whose contents have changed and that hold something, and their totals."""
-    found = [*(kind.totals(changed) for kind in shared), *cell_polygons.totals(changed)]
-    every = sums(Totals.concatenate([t for t, _ in found]), np.concatenate([c for _, c in found]), len(tree))
+    pairs = [*(kind.totals(changed) for kind in shared), *cell_polygons.totals(changed)]
+    every = sums(Totals.concatenate([t for t, _ in pairs]), np.concatenate([c for _, c in pairs]), len(tree))
     nodes = np.flatnonzero(every.area > 0)
     return nodes, every.take(nodes)
 

@@ -89,7 +89,7 @@ class Meshes:
         self.mirrored = np.linalg.det(rows) < 0
         self.largest = np.linalg.norm(rows, ord=2, axis=(1, 2)) if len(rows) else np.zeros(0)
         self.mean_scale = np.linalg.norm(rows, axis=2).mean(axis=1)
-        sizes = [[len(own) for own in (s.positions, s.corner_verts, s.material, s.colors)] for s in surfaces]
+        sizes = [[len(array) for array in (s.positions, s.corner_verts, s.material, s.colors)] for s in surfaces]
         starts = np.cumsum([[0] * 4, *sizes], axis=0).T
         self.first_vertex, self.first_corner, self.first_face, self.first_slot = starts
         every, none = list(zip(surfaces, *starts[:, :-1], strict=True)), np.zeros(0, np.int64)
@@ -180,8 +180,8 @@ class Polygons(Arrays):
         instance, face = spread(np.diff(meshes.first_face)[meshes.surface])
         face += meshes.first_face[meshes.surface][instance]
         center = np.zeros((len(face), 3))
-        for some in blocks(len(face), MEASURE_BATCH):
-            center[some] = meshes.to_world(meshes.centers[face[some], None], instance[some])[:, 0]
+        for block in blocks(len(face), MEASURE_BATCH):
+            center[block] = meshes.to_world(meshes.centers[face[block], None], instance[block])[:, 0]
         reach = meshes.radii[face] * meshes.largest[instance]
         whole = np.full(len(face), -1, np.int32)
         none = np.zeros(0, np.int32), np.zeros((0, 3, 3))
@@ -209,9 +209,9 @@ class Polygons(Arrays):
         rows = part[cut]
         part = np.full(len(part), -1, np.int32)
         part[cut] = np.arange(len(cut), dtype=np.int32)
-        some = (a[index] for a in (self.face, self.instance))
+        faces = (a[index] for a in (self.face, self.instance))
         more = (a[rows] for a in (self.triangle, self.weights))
-        return Polygons(self.meshes, *some, part, *more, self.center[index], self.reach[index])
+        return Polygons(self.meshes, *faces, part, *more, self.center[index], self.reach[index])
 
     @classmethod
     def concatenate(cls, parts: Sequence[Self]) -> Self:
@@ -221,11 +221,11 @@ class Polygons(Arrays):
             return parts[0]
         first = np.cumsum([0] + [len(p.triangle) for p in parts[:-1]])
         shifted = [np.where(p.part < 0, p.part, p.part + n) for p, n in zip(parts, first, strict=True)]
-        own = {
+        columns = {
             name: np.concatenate([getattr(p, name) for p in parts])
             for name in ("face", "instance", "triangle", "weights", "center", "reach")
         }
-        return replace(parts[0], part=np.concatenate(shifted).astype(np.int32), **own)
+        return replace(parts[0], part=np.concatenate(shifted).astype(np.int32), **columns)
 
     @property
     def triangle_counts(self) -> Integers:
@@ -246,27 +246,27 @@ class Polygons(Arrays):
         cut = self.part >= 0
         owner, index = spread(self.triangle_counts)
         triangle, fraction = self.meshes.face_triangle[self.face][owner] + index, np.ones(len(owner))
-        own = np.flatnonzero(cut[owner])
-        rows = self.part[owner[own]]
-        triangle[own], fraction[own] = self.triangle[rows], area_fractions(self.weights)[rows]
+        fragments = np.flatnonzero(cut[owner])
+        rows = self.part[owner[fragments]]
+        triangle[fragments], fraction[fragments] = self.triangle[rows], area_fractions(self.weights)[rows]
         return owner, triangle, fraction
 
     def as_fragments(self) -> tuple[Integers, Self]:
         """The polygon (k,) that each fragment comes from, and fragments; whole faces become their triangles."""
         owner, triangle, _ = self.triangles()
         weights = np.broadcast_to(np.eye(3), (len(owner), 3, 3)).copy()
-        own = np.flatnonzero(self.part[owner] >= 0)
-        weights[own] = self.weights[self.part[owner[own]]]
+        fragments = np.flatnonzero(self.part[owner] >= 0)
+        weights[fragments] = self.weights[self.part[owner[fragments]]]
         return owner, Polygons.fragments(self.meshes, self.face[owner], self.instance[owner], triangle, weights)
 
     def areas(self) -> Floats:
         """Areas (n,), m²."""
         areas = np.zeros(len(self))
         for run in chunks(self.triangle_counts, MEASURE_BATCH):
-            some = self.take(run)
-            owner, triangle, fraction = some.triangles()
-            own = np.linalg.norm(self.meshes.vectors(triangle, some.instance[owner]), axis=1)
-            areas[run] = np.bincount(owner, fraction * own, len(some))
+            polygons = self.take(run)
+            owner, triangle, fraction = polygons.triangles()
+            area = np.linalg.norm(self.meshes.vectors(triangle, polygons.instance[owner]), axis=1)
+            areas[run] = np.bincount(owner, fraction * area, len(polygons))
         return areas
 
     def distances(self, planes: Floats) -> tuple[Floats, Floats]:
@@ -319,8 +319,8 @@ def mended(polygons: Polygons) -> Polygons:
     key = polygons.instance[cut].astype(np.int64) * len(meshes.face_size) + polygons.face[cut]
     _, first, number = np.unique(key, return_index=True, return_inverse=True)
     number = number.reshape(-1)
-    there = np.bincount(number, area_fractions(polygons.weights)[polygons.part[cut]])
-    complete = there >= meshes.face_size[polygons.face[cut[first]]] - 2 - _WHOLE
+    covered = np.bincount(number, area_fractions(polygons.weights)[polygons.part[cut]])
+    complete = covered >= meshes.face_size[polygons.face[cut[first]]] - 2 - _WHOLE
     part = polygons.part.copy()
     part[cut[complete[number]]] = -1
     stays = np.ones(len(polygons), bool)

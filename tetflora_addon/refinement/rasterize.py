@@ -84,9 +84,9 @@ def tetrahedron_fragments(vertices: Floats, camera: Camera, width: int, height: 
     mean chord V / A as thickness: Σ coverage · thickness over all pixels is its volume, per area of a pixel.
     """
     # One after another: threads, and other processes, took as long for the many small steps of this.
-    some = blocks(len(vertices), TETRAHEDRON_BATCH)
-    made = [(block.start, _fragments(vertices[block], camera, width, height)) for block in some]
-    return Fragments.concatenate([replace(part, cell=part.cell + np.int32(start)) for start, part in made])
+    batches = blocks(len(vertices), TETRAHEDRON_BATCH)
+    parts = [(block.start, _fragments(vertices[block], camera, width, height)) for block in batches]
+    return Fragments.concatenate([replace(part, cell=part.cell + np.int32(start)) for start, part in parts])
 
 
 def occluder_depth(triangles: Floats, camera: Camera, width: int, height: int) -> Floats:
@@ -125,15 +125,15 @@ def _fragments(vertices: Floats, camera: Camera, width: int, height: int) -> Fra
     parts, below = [Fragments.empty()], least.sum(axis=1)
     for count in range(5):
         for rows in _rows(box, np.flatnonzero(below == count)):
-            own, column, bounds = _within(planes, count, ends, rows, x, y)
-            cell, row = rows.cell[own], rows.number[own]
+            index, column, bounds = _within(planes, count, ends, rows, x, y)
+            cell, row = rows.cell[index], rows.number[index]
             enter, leave = bounds if parallel else (1.0 / bounds[1], 1.0 / bounds[0])
             meters = _ray_meters(camera, x[column], y[row])
             # Half the memory of intp; a heavy scene has millions of fragments.
             which, pixel = cell.astype(np.int32), (row * width + column).astype(np.int32)
             parts.append(Fragments(which, pixel, enter * meters, (leave - enter) * meters, np.ones(len(which))))
-    found = Fragments.concatenate(parts)
-    return _with_small_ones(vertices, local, camera, (width, height), (low, high, middle), found)
+    fragments = Fragments.concatenate(parts)
+    return _with_small_ones(vertices, local, camera, (width, height), (low, high, middle), fragments)
 
 
 @dataclass(frozen=True)
@@ -187,12 +187,12 @@ def _rows(box: Integers, which: Integers) -> Iterator[_Rows]:
 
 
 def _with_small_ones(
-    vertices: Floats, local: Floats, camera: Camera, size: tuple[int, int], bounds: Sequence[Floats], found: Fragments
+    vertices: Floats, local: Floats, camera: Camera, size: tuple[int, int], bounds: Sequence[Floats], pieces: Fragments
 ) -> Fragments:
     """Add fragments for tetrahedra between the pixels' centers, and set the coverage of all."""
     (width, height), (low, high, middle) = size, bounds
     corner, step = _grid(camera, width, height)
-    count = np.bincount(found.cell, minlength=len(vertices))
+    count = np.bincount(pieces.cell, minlength=len(vertices))
     area, whole = silhouette_area(local, low, high, camera)
     area = area / np.prod(step)
     # Of what is partly out of view only the box is known; a tetrahedron fills half of it or less.
@@ -218,10 +218,10 @@ def _with_small_ones(
     across = projected_area(vertices[small], direction)
     chord[small] = volume(vertices[small]) / np.where(across > 0.0, across, 1.0)
 
-    cell = np.concatenate([found.cell, missed.astype(np.int32)])
-    pixel = np.concatenate([found.pixel, (row * width + col).astype(np.int32)])
-    entry = np.concatenate([found.entry, np.maximum(along - chord[missed] / 2.0, 0.0)])
-    thickness = np.concatenate([found.thickness, chord[missed]])
+    cell = np.concatenate([pieces.cell, missed.astype(np.int32)])
+    pixel = np.concatenate([pieces.pixel, (row * width + col).astype(np.int32)])
+    entry = np.concatenate([pieces.entry, np.maximum(along - chord[missed] / 2.0, 0.0)])
+    thickness = np.concatenate([pieces.thickness, chord[missed]])
     by_area = by_area[cell]
     thickness = np.where(by_area, chord[cell], thickness)
     coverage = np.where(by_area, area[cell] / np.maximum(count[cell], 1), 1.0)

@@ -61,22 +61,22 @@ class SharePoints(Arrays):
         return self.leaf + self.wood / 2
 
 
-def _descend(tree: TetrahedralTree, points: SharePoints, some: Integers | None = None) -> Integers32:
+def _descend(tree: TetrahedralTree, points: SharePoints, wanted: Integers | None = None) -> Integers32:
     """Terminal nodes (m,) that points, or only some (k,) of them, are in below those that they are known to be in."""
-    cell, children = points.cell if some is None else points.cell[some], tree.children.reshape(-1)
+    cell, children = points.cell if wanted is None else points.cell[wanted], tree.children.reshape(-1)
     every = np.flatnonzero(np.take(children, 2 * cell) >= 0)
     cell = cell.copy()
 
     def lower(block: slice) -> None:
         moving = every[block]
-        place = np.take(points.position, moving if some is None else some[moving], axis=0).astype(np.float64)
+        place = np.take(points.position, moving if wanted is None else wanted[moving], axis=0).astype(np.float64)
         while len(moving):
-            at = np.take(cell, moving)
-            plane = tree.planes(at)
+            nodes = np.take(cell, moving)
+            plane = tree.planes(nodes)
             side = plane[:, 3] + np.einsum("ni,ni->n", plane[:, :3], place) >= 0.0
-            at = np.take(children, 2 * at + side)
-            cell[moving] = at
-            left = np.flatnonzero(np.take(children, 2 * at) >= 0)
+            nodes = np.take(children, 2 * nodes + side)
+            cell[moving] = nodes
+            left = np.flatnonzero(np.take(children, 2 * nodes) >= 0)
             if len(left) < len(moving):
                 moving, place = moving[left], np.take(place, left, axis=0)
 
@@ -191,8 +191,8 @@ class SharedParts(Generic[Parts]):
         gone = np.flatnonzero(opening[self._points.rows.part])
         count, parts, points = len(self._parts), [], []
         for new, _, known in self.opened(self._parts.take_out(np.flatnonzero(opening))):
-            made = self.points_on(new, known)
-            points.append(replace(made, part=made.part + np.int32(count)))
+            batch = self.points_on(new, known)
+            points.append(replace(batch, part=batch.part + np.int32(count)))
             parts.append(new)
             count += len(new)
         new_parts, new_points = self._parts.kind.concatenate(parts), SharePoints.concatenate(points)
@@ -210,10 +210,10 @@ class SharedParts(Generic[Parts]):
     def _drop_opened(self) -> Parts:
         """All parts, after those that have been opened are dropped and the others numbered anew."""
         if self._parts.marked:
-            there = self._parts.there
+            present = self._parts.there
             part = self._points.rows.part
-            part[:] = (np.cumsum(there) - 1).astype(np.int32)[part]
-            self._figures = Growing(self._figures.rows.take(there))
+            part[:] = (np.cumsum(present) - 1).astype(np.int32)[part]
+            self._figures = Growing(self._figures.rows.take(present))
         return self._parts.joined()
 
     def held(self, nodes: int) -> InCells[Parts]:
@@ -228,8 +228,8 @@ class SharedParts(Generic[Parts]):
         points, figures = self._points.rows, self._figures.rows
         cell, part, leaf, wood = points.cell, points.part, points.leaf, points.wood
         if not chosen.all():
-            some = np.flatnonzero(chosen[cell])
-            cell, part, leaf, wood = (np.take(own, some) for own in (cell, part, leaf, wood))
+            inside = np.flatnonzero(chosen[cell])
+            cell, part, leaf, wood = (np.take(array, inside) for array in (cell, part, leaf, wood))
         fraction = (leaf + wood) / np.maximum(np.take(figures.area, part), 1e-300)
         return Totals(leaf, wood, np.take(figures.polygons, part) * fraction, np.take(figures.width, part)), cell
 
@@ -276,7 +276,7 @@ def _share_points(
     part = min(room / max(beyond[parts.totals.leaf_area > 0].sum(), 1), 1.0)
     number = times_each * least + (beyond * part).astype(np.int64)
     wood = np.maximum(np.ceil(WOOD * number).astype(np.int64), along)
-    made = []
+    groups = []
     for leafy in (True, False):
         area = parts.totals.leaf_area if leafy else parts.totals.wood_area
         count = np.where(area > 0, number if leafy else wood, 0)
@@ -295,14 +295,14 @@ def _share_points(
             points = flora.samples.leaves if leafy else flora.samples.wood
             position, share = _sampled(flora, points, parts.branches, owner, index)
             even = even if share is None else even * share
-            some = np.flatnonzero(solid[owner])
-            if leafy and len(some):  # more places than samples
-                given = owner[some], index[some], (index[some] + 0.5) / count[owner[some]]
-                position[some] = _on_leaves(flora, parts.branches, axes(flora.rows, parts.branches), *given)
+            in_solid = np.flatnonzero(solid[owner])
+            if leafy and len(in_solid):  # more places than samples
+                given = owner[in_solid], index[in_solid], (index[in_solid] + 0.5) / count[owner[in_solid]]
+                position[in_solid] = _on_leaves(flora, parts.branches, axes(flora.rows, parts.branches), *given)
         none = np.zeros(len(owner), np.float32)
         areas = (even.astype(np.float32), none) if leafy else (none, even.astype(np.float32))
-        made.append(SharePoints(owner.astype(np.int32), none.astype(np.int32), position.astype(np.float32), *areas))
-    return SharePoints.concatenate(made)
+        groups.append(SharePoints(owner.astype(np.int32), none.astype(np.int32), position.astype(np.float32), *areas))
+    return SharePoints.concatenate(groups)
 
 
 def _on_leaves(flora: Flora, branches: Branches, lines: Axes, owner: Integers, index: Integers, part: Floats) -> Floats:
@@ -341,8 +341,8 @@ def opened(flora: Flora, parts: PlantParts) -> Iterator[tuple[PlantParts, Intege
     """
     segments = flora.rows["segments"][parts.branches.row]
     for number in np.flatnonzero(np.bincount(segments)):  # bending takes as long for all as for the most
-        some = np.flatnonzero(segments == number)
-        for chosen in np.split(some, np.arange(OPEN_BATCH, len(some), OPEN_BATCH)):
+        alike = np.flatnonzero(segments == number)
+        for chosen in np.split(alike, np.arange(OPEN_BATCH, len(alike), OPEN_BATCH)):
             whole, body, grown, parent = open_branches(flora.rows, parts.branches.take(chosen))
             yield PlantParts.of_branches(flora, whole.branches), chosen[body], whole.lines
             if len(grown):
@@ -385,8 +385,8 @@ class SharedPlants(SharedParts[PlantParts]):
         width = 2.0 * branches.radius / (THICK * min(camera.width, camera.height))
         out = np.zeros(len(parts), bool)
         for place in _PLACES:
-            at = branches.position + place * axis
-            out |= (width > camera.extent_around(at)) & (camera.distance_to_view(at) < beside)
+            points = branches.position + place * axis
+            out |= (width > camera.extent_around(points)) & (camera.distance_to_view(points) < beside)
         return out
 
     def points_on(self, parts: PlantParts, lines: Axes | None) -> SharePoints:
@@ -395,16 +395,16 @@ class SharedPlants(SharedParts[PlantParts]):
         if lines is not None:
             along = parts.branches.length / np.maximum(2.0 * APART * parts.branches.radius, 1e-300)
             along = np.where(self.thick(parts), np.minimum(along, MOST_ALONG), 0.0).astype(np.int64)
-        made = _share_points(self.flora, parts, self.pixels(parts), lines, self._times, along, self._room)
-        self._room -= min(self._room, max(len(made) - self._times * FEWEST * len(parts), 0))
-        return made
+        points = _share_points(self.flora, parts, self.pixels(parts), lines, self._times, along, self._room)
+        self._room -= min(self._room, max(len(points) - self._times * FEWEST * len(parts), 0))
+        return points
 
     def held_apart(self, nodes: int) -> tuple[InCells[Branches], InCells[Pieces]]:
         """As `held`: sub-plants, and branches alone as one piece each."""
         every = self.held(nodes)
-        own, opened = (every.take(np.flatnonzero(every.items.branch_only == alone)) for alone in (False, True))
+        intact, opened = (every.take(np.flatnonzero(every.items.branch_only == alone)) for alone in (False, True))
         pieces = as_pieces(opened.items.branches)
-        return InCells(own.items.branches, own.cell, own.totals), InCells(pieces, opened.cell, opened.totals)
+        return InCells(intact.items.branches, intact.cell, intact.totals), InCells(pieces, opened.cell, opened.totals)
 
 
 #: Axes that differ in length by more than this are stretched, and the same of the cosine between them.
@@ -474,8 +474,8 @@ class PlacedAssets:
         """Corners (k, 4, 3) of kites for all leaves of clusters (n,), meters."""
         leaves, clusters, asset = self.assets.leaves, self.assets.clusters, self.instances.asset[parts.instance]
         owner, index = spread(clusters.leaves[parts.cluster].astype(np.int64))
-        own = leaves.take((self.assets.first_leaf[asset] + clusters.first_leaf[parts.cluster])[owner] + index)
-        corners = (own.center - own.along, own.center - own.across, own.center + own.along, own.center + own.across)
+        leaf = leaves.take((self.assets.first_leaf[asset] + clusters.first_leaf[parts.cluster])[owner] + index)
+        corners = (leaf.center + sign * half for sign in (-1.0, 1.0) for half in (leaf.along, leaf.across))
         return np.stack([self.to_world(corner, parts.instance[owner]) for corner in corners], axis=1)
 
     def to_world(self, points: NDArray[np.floating], instance: Integers) -> Floats:
@@ -495,16 +495,16 @@ class PlacedAssets:
         """Areas (n,) of sheets and of solids, m²; where an instance is stretched, as its samples say."""
         clusters, scale = self.assets.clusters, self.scale[instance] ** 2
         leaf, wood = clusters.leaf_area[cluster] * scale, clusters.wood_area[cluster] * scale
-        some = np.flatnonzero(self.stretched[instance])
-        if len(some):
-            own, of = cluster[some], instance[some]
-            number = (clusters.leaf_samples + clusters.wood_samples)[own].astype(np.int64)
+        stretched = np.flatnonzero(self.stretched[instance])
+        if len(stretched):
+            rows, of = cluster[stretched], instance[stretched]
+            number = (clusters.leaf_samples + clusters.wood_samples)[rows].astype(np.int64)
             owner, index = spread(number)
-            normal = self.assets.samples.normal[clusters.leaf_sample[own][owner] + index].astype(np.float64)
+            normal = self.assets.samples.normal[clusters.leaf_sample[rows][owner] + index].astype(np.float64)
             turned = np.einsum("nij,nj->ni", self.cofactors(of[owner]), normal)
-            longer = np.bincount(owner, np.linalg.norm(turned, axis=1), len(own)) / number
-            leaf[some] *= longer / scale[some]
-            wood[some] *= longer / scale[some]
+            longer = np.bincount(owner, np.linalg.norm(turned, axis=1), len(rows)) / number
+            leaf[stretched] *= longer / scale[stretched]
+            wood[stretched] *= longer / scale[stretched]
         return leaf, wood
 
     def closed_leaves(self, parts: AssetParts) -> Floats:
@@ -550,18 +550,18 @@ class SharedAssets(SharedParts[AssetParts]):
         clusters, key = self.placed.assets.clusters, self.placed.keys(parts)
         closed_leaves = self.placed.closed_leaves(parts)
         number = np.ceil(np.maximum(pixels / PIXELS_A_POINT, FEWEST)) * self._times
-        made = []
+        groups = []
         for leafy in (True, False):
             sheets = parts.totals.leaf_area if leafy else np.zeros(len(parts))
             solids = closed_leaves if leafy else parts.totals.wood_area - closed_leaves
             part = (sheets + solids / 2) / np.maximum(parts.totals.optical_area, 1e-300)
-            there = (clusters.leaf_samples if leafy else clusters.wood_samples)[parts.cluster]
-            count = np.minimum(np.ceil(number * part), there)
-            count = np.where((sheets + solids > 0.0) & (there > 0), np.maximum(count, 1), 0).astype(np.int64)
+            samples = (clusters.leaf_samples if leafy else clusters.wood_samples)[parts.cluster]
+            count = np.minimum(np.ceil(number * part), samples)
+            count = np.where((sheets + solids > 0.0) & (samples > 0), np.maximum(count, 1), 0).astype(np.int64)
             owner, index = spread(count)
             pick = self.placed.picked(parts, key, leafy, owner, index)
             place = self.placed.to_world(self.placed.assets.samples.position[pick], parts.instance[owner])
             leaf, wood = ((area / np.maximum(count, 1))[owner].astype(np.float32) for area in (sheets, solids))
             cell = np.zeros(len(owner), np.int32)
-            made.append(SharePoints(owner.astype(np.int32), cell, place.astype(np.float32), leaf, wood))
-        return SharePoints.concatenate(made)
+            groups.append(SharePoints(owner.astype(np.int32), cell, place.astype(np.float32), leaf, wood))
+        return SharePoints.concatenate(groups)

@@ -61,19 +61,19 @@ def summarize(
         if len(keep) == 0:  # clumping and orientation are computed only for plants
             continue
         held, clumping = held.take(keep), flora.clumping
-        own, totals = held.items, held.totals
-        branches = own.branches if isinstance(own, Pieces) else own
+        parts, totals = held.items, held.totals
+        branches = parts.branches if isinstance(parts, Pieces) else parts
         row = branches.row
         # A sub-plant shows the mean of all that grows on it, a piece only its own bark and leaves.
-        if branches is own:
+        if branches is parts:
             leaf_color, wood_color = flora.leaf_colors(branches), flora.wood_color[row]
             leaf_moment = leaf_moments(flora.orientation, branches)
             wood_moment, transmission = wood_moments(flora.orientation, branches), flora.transmission[row]
             clumped = clumping.coefficients(branches, clumping.whole)
         else:
-            axis = unit(own.end - own.start)
-            leaf_color, wood_color = piece_leaf_colors(flora, own), flora.rows["branch_color"][row, 0]
-            outward = np.mean(outward_ends(flora, own), axis=0)
+            axis = unit(parts.end - parts.start)
+            leaf_color, wood_color = piece_leaf_colors(flora, parts), flora.rows["branch_color"][row, 0]
+            outward = np.mean(outward_ends(flora, parts), axis=0)
             leaf_moment = own_leaf_moments(flora.orientation, row, axis, outward)
             wood_moment = (np.eye(3) - axis[:, :, None] * axis[:, None, :]) / 2
             transmission = flora.leaf.transmission[row]
@@ -102,8 +102,8 @@ def _add_polygons(sums: Floats, contents: Contents, index: Integers) -> None:
     chosen = np.flatnonzero(index[contents.polygons.cell] >= 0)
     meshes = contents.polygons.items.meshes
     for run in chunks(contents.polygons.items.triangle_counts[chosen], MEASURE_BATCH):
-        some = chosen[run]
-        polygons = contents.polygons.items.take(some)
+        rows = chosen[run]
+        polygons = contents.polygons.items.take(rows)
         owner, triangle, fraction = polygons.triangles()
         face = polygons.face[owner]
         slot, solid = meshes.slot[face], meshes.solid[face]
@@ -115,7 +115,7 @@ def _add_polygons(sums: Floats, contents: Contents, index: Integers) -> None:
         even = np.broadcast_to([1.0, 0.0], (len(face), 2))
         look = meshes.colors[slot], meshes.transmission[slot][:, None]
         seen = np.concatenate([np.ones_like(optical), *look, moment, even], axis=1)
-        _add(sums, index[contents.polygons.cell[some]][owner], optical * seen)
+        _add(sums, index[contents.polygons.cell[rows]][owner], optical * seen)
 
 
 def _add_assets(sums: Floats, placed: PlacedAssets, held: InCells[AssetParts], index: Integers) -> None:

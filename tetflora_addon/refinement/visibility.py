@@ -105,10 +105,10 @@ class AlphaBuffer:
         with np.errstate(invalid="ignore"):
             depth = np.asarray(extinction, np.float64)[cell] * fragments.thickness
         # 0 · ∞ where a ray touches an opaque cell in a point: nothing.
-        own = np.nan_to_num(np.minimum(depth, OPAQUE), nan=0.0)
+        optical = np.nan_to_num(np.minimum(depth, OPAQUE), nan=0.0)
         counted = coverage if self.pixel_weight is None else coverage * self.pixel_weight[pixel]
         weight = np.bincount(cell, counted, count)
-        opacity = np.bincount(cell, -counted * np.expm1(-own), count) / np.where(weight > 0.0, weight, 1.0)
+        opacity = np.bincount(cell, -counted * np.expm1(-optical), count) / np.where(weight > 0.0, weight, 1.0)
         pixels, whole = silhouette_pixels(vertices, self.camera)
         final = self.camera.width * self.camera.height / (self.width * self.height)
         exact = whole & (weight > 0.0)
@@ -122,7 +122,7 @@ class AlphaBuffer:
             ("_pixel", pixel),
             (
                 "_depth",
-                own * np.minimum(coverage * fraction, 1.0) * (fragments.entry >= self.camera.min_occluding_depth),
+                optical * np.minimum(coverage * fraction, 1.0) * (fragments.entry >= self.camera.min_occluding_depth),
             ),
             ("_fraction", counted * fraction / np.maximum(weight, 1e-300)[cell]),
             ("_before", np.ones(len(cell))),
@@ -147,15 +147,15 @@ class AlphaBuffer:
         none negative. What has been ranked before keeps its place relative to each other.
         """
         # Only where something has come or gone is there anything to sort again.
-        some = np.flatnonzero(self._changed[self._pixel])
+        stale = np.flatnonzero(self._changed[self._pixel])
         self._changed[:] = False
-        pixel, depth = np.take(self._pixel, some), np.take(self._depth, some)
+        pixel, depth = np.take(self._pixel, stale), np.take(self._depth, stale)
         # One number to sort by is several times as fast as two.
-        key = pixel.astype(np.int64) * (int(rank.max(initial=0)) + 1) + np.take(rank, np.take(self._cell, some))
+        key = pixel.astype(np.int64) * (int(rank.max(initial=0)) + 1) + np.take(rank, np.take(self._cell, stale))
         order = np.argsort(key)
         before = np.zeros_like(depth)
         before[order] = depth_in_front(np.take(pixel, order), np.take(depth, order))[1]
-        self._before[some] = np.exp(-before)
+        self._before[stale] = np.exp(-before)
         return np.bincount(self._cell, self._fraction * self._before, len(rank))
 
 
@@ -250,8 +250,8 @@ class _PanoramaBuffer:
             solid = (2.0 / side) ** 2 * (directions @ -face.frame[:, 2]) ** 3
             pixel_weight = solid * pixels_per_solid_angle(camera, directions)
             if pixel_weight.any():
-                some = occluders is not None and len(occluders)
-                end = occluder_depth(occluders, hiding(face), side, side) if some else None
+                occluded = occluders is not None and len(occluders)
+                end = occluder_depth(occluders, hiding(face), side, side) if occluded else None
                 self.faces.append(AlphaBuffer(face, side, end, pixel_weight))
         self._weight = np.zeros((len(self.faces), 0))
 
@@ -264,11 +264,11 @@ class _PanoramaBuffer:
         for number, face in enumerate(self.faces):
             x, y, depth = np.moveaxis(face.camera.to_camera_space(vertices), -1, 0)
             walls = (depth - x, depth + x, depth - y, depth + y)  # of the face's pyramid
-            some = np.flatnonzero(np.logical_and.reduce([(wall > 0.0).any(axis=1) for wall in walls]))
-            outline = face.add(cells[some], vertices[some], extinction[some])
-            self._weight[number, cells[some]] = outline.pixels
-            pixels[some] += outline.pixels
-            opacity[some] += outline.pixels * outline.opacity
+            inside = np.flatnonzero(np.logical_and.reduce([(wall > 0.0).any(axis=1) for wall in walls]))
+            outline = face.add(cells[inside], vertices[inside], extinction[inside])
+            self._weight[number, cells[inside]] = outline.pixels
+            pixels[inside] += outline.pixels
+            opacity[inside] += outline.pixels * outline.opacity
         whole = (self.camera.distance_to_view(vertices.reshape(-1, 3)).reshape(-1, 4) <= 0.0).all(axis=1)
         return Outline(pixels, opacity / np.where(pixels > 0.0, pixels, 1.0), whole)
 

@@ -390,7 +390,7 @@ class _Aged:
     def _leaves(self, o: int) -> dict[str, Any]:
         """Leaves of an order: as many on a meter; on what is as short as a twig, as many as on twigs."""
         order, now = self.one.orders[o], self.now[o]
-        own = order.leaves.mean * now * self.leafless
+        borne = order.leaves.mean * now * self.leafless
         changes = {"leaves": order.leaves.scaled(now * self.leafless), "leaf_size": self._leaf(order)}
         bearers = [p for p in range(o + 1, self.last + 1) if self.one.orders[p].leaves.high > 0]
         twig = self.one.orders[bearers[-1]] if bearers else order
@@ -404,7 +404,7 @@ class _Aged:
             start, fade = max(start, 1 - self._leader(o)), max(fade, self.youth)
         number = twig.leaves.mean * self.whole[o] * now / long * (1 - start) * max(fade - full, 0.0)
         number = self.leafless * max(number, _FIRST * fade * (o == self.stem))
-        if number <= own:
+        if number <= borne:
             return changes
         taken = {name: getattr(twig, name) for name in vars(order) if name.startswith("leaf")}
         leaves = Range(number, number * twig.leaves.variation / twig.leaves.mean)

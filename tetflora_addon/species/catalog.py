@@ -111,8 +111,8 @@ def species_from_dict(data: Any, identifier: str, source: str) -> Species:
             raise reader.fail(key, "missing; add this key")
     orders = data["orders"]
     if not isinstance(orders, list) or not 1 <= len(orders) <= MAX_ORDERS:
-        found = len(orders) if isinstance(orders, list) else quoted(orders)
-        raise reader.fail("orders", f"must be a list of 1 to {MAX_ORDERS} orders, has {found}")
+        content = len(orders) if isinstance(orders, list) else quoted(orders)
+        raise reader.fail("orders", f"must be a list of 1 to {MAX_ORDERS} orders, has {content}")
     read = tuple(_read_order(reader, o, f"orders[{i}]", i == 0, i == len(orders) - 1) for i, o in enumerate(orders))
     spur = None
     if "spur" in data or any(order.spurs.high > 0 for order in read):
@@ -265,9 +265,9 @@ def odd_files(folders: Sequence[Path]) -> list[str]:
     return [readable(f'"{path.name}": {reason}') for folder in folders for path, reason in _files(folder) if reason]
 
 
-def in_order(found: Mapping[str, FileInfo]) -> dict[str, FileInfo]:
+def in_order(infos: Mapping[str, FileInfo]) -> dict[str, FileInfo]:
     """Species in the order in which they are offered: `FIRST`, then the others by name."""
-    return dict(sorted(found.items(), key=lambda item: (item[0] != FIRST, item[1].name.lower())))
+    return dict(sorted(infos.items(), key=lambda item: (item[0] != FIRST, item[1].name.lower())))
 
 
 def list_species(folders: Sequence[Path] = ()) -> dict[str, FileInfo]:
@@ -284,10 +284,10 @@ def list_species(folders: Sequence[Path] = ()) -> dict[str, FileInfo]:
 
 def files_in(folders: Iterable[Path], remedy: str) -> dict[str, FileInfo]:
     """Files of folders by identifier, those of later ones instead of others; ``remedy`` tells why one is broken."""
-    found: dict[str, FileInfo] = {}
+    infos: dict[str, FileInfo] = {}
     for folder in folders:
-        found |= _listed(folder, _entries(folder), remedy)
-    return found
+        infos |= _listed(folder, _entries(folder), remedy)
+    return infos
 
 
 def _entries(folder: Path) -> tuple[tuple[str, int, int, int], ...]:

@@ -99,15 +99,15 @@ def litter_page(species: Species, page: Mapping[str, Any]) -> dict[str, Any] | N
     if needles:
         around["leaf_light"], middle["thickness"] = [0.97, 0.03], [0.05, 0.004]
     own_forms = page["leaf"] if isinstance(page["leaf"], list) else [page["leaf"]]
-    dried = [one for form, own in zip(species.leaf, own_forms, strict=True) for one in _dried(form, own)]
+    dried = [one for form, entry in zip(species.leaf, own_forms, strict=True) for one in _dried(form, entry)]
     what = f"Fallen {'needles, twigs and cones' if needles else 'leaves'} of {species.name}, a patch of "
-    made = _page(species, "litter", f"{what}{200 * radius:.0f} cm", [middle, around])
-    made |= {"leaf": _strewn(needle) if needles else dried[:MAX_FORMS]}
-    made |= {"leaf_transmission": round(0.4 * species.leaf_transmission, 3)}
+    new_page = _page(species, "litter", f"{what}{200 * radius:.0f} cm", [middle, around])
+    new_page |= {"leaf": _strewn(needle) if needles else dried[:MAX_FORMS]}
+    new_page |= {"leaf_transmission": round(0.4 * species.leaf_transmission, 3)}
     if needles:
-        made |= {"blossom": parts["cone"], "blossom_transmission": 0, "spur": parts["spur"]}
+        new_page |= {"blossom": parts["cone"], "blossom_transmission": 0, "spur": parts["spur"]}
         around["spurs"], around["spur_start"] = _pair(_CONES / twigs, _CONES / twigs), 0.3
-    return made
+    return new_page
 
 
 def branch_page(species: Species, page: Mapping[str, Any]) -> dict[str, Any] | None:
@@ -125,8 +125,8 @@ def branch_page(species: Species, page: Mapping[str, Any]) -> dict[str, Any] | N
     orders[-1]["branches"] = 0
     orders[0] |= _parts()["bough"] | {"length": _pair(length, 0.4 * length)}
     orders[0].pop("angle_tip", None)
-    made = _page(species, "branch", f"A fallen branch of {species.name}, about {length:.1f} m long", orders)
-    return made | {"leaf": page["leaf"]}
+    new_page = _page(species, "branch", f"A fallen branch of {species.name}, about {length:.1f} m long", orders)
+    return new_page | {"leaf": page["leaf"]}
 
 
 def log_page(species: Species, page: Mapping[str, Any]) -> dict[str, Any] | None:
@@ -147,8 +147,8 @@ def log_page(species: Species, page: Mapping[str, Any]) -> dict[str, Any] | None
     orders = [parts["stem"], log, parts["stub"]]
     for order, how in zip(orders, (0.65, 0.65, 0.7), strict=True):
         order["branch_color"] = _weathered(color, how)
-    made = _page(species, "log", f"A fallen log of {species.name}, about {length:.1f} m long", orders)
-    return made | {"leaf": page["leaf"], "blossom": parts["cut"], "blossom_transmission": 0}
+    new_page = _page(species, "log", f"A fallen log of {species.name}, about {length:.1f} m long", orders)
+    return new_page | {"leaf": page["leaf"], "blossom": parts["cut"], "blossom_transmission": 0}
 
 
 #: Pages by the ending of the identifier that the fallen parts of a species have.
@@ -159,10 +159,10 @@ FALLEN: dict[str, Callable[[Species, Mapping[str, Any]], dict[str, Any] | None]]
 }
 
 
-def _dried(form: LeafModel | str, own: dict[str, Any]) -> list[dict[str, Any]]:
+def _dried(form: LeafModel | str, entry: dict[str, Any]) -> list[dict[str, Any]]:
     """A leaf as it dries: flat, cupped and rolled back, where its blade is known; else as the page has it."""
     if not isinstance(form, LeafModel) or not isinstance(form.shape, Blade):
-        return [own]
+        return [entry]
     blade = {f.name: getattr(form.shape, f.name) for f in fields(Blade) if getattr(form.shape, f.name) != f.default}
     return [{"outline": {"kind": "blade", **blade, **bent}} for bent in _parts()["bent"]]
 
@@ -231,13 +231,13 @@ def shed_share(species: Species) -> float:
 
 def leaves_page(species: Species, page: Mapping[str, Any]) -> dict[str, Any] | None:
     """The page of a patch of leaves that fall in autumn; None of a species that sheds none."""
-    made = litter_page(species, page) if shed_share(species) > 0.0 else None
-    if made is None:
+    litter = litter_page(species, page) if shed_share(species) > 0.0 else None
+    if litter is None:
         return None
     leaf = species.year.leaf
-    middle, around = made["orders"]
+    middle, around = litter["orders"]
     for key in ("blossom", "blossom_transmission", "spur"):
-        made.pop(key, None)
+        litter.pop(key, None)
     around = {key: value for key, value in around.items() if not key.startswith("spur")}
     area = leaf_area(species)
     number = min(max(_SHED_AREA / area, _SHED_LEAVES[0]), _SHED_LEAVES[1])
@@ -254,7 +254,7 @@ def leaves_page(species: Species, page: Mapping[str, Any]) -> dict[str, Any] | N
         "leaf_color_tip": color,
     }
     middle |= {"thickness": _THREAD, "branches": [_ARMS, 0]}
-    return made | {
+    return litter | {
         "name": f"{species.name} fallen leaves"[:1000],
         "description": f"Leaves that {species.name} sheds in autumn, a patch of {200 * radius:.0f} cm"[:1000],
         "orders": [middle, around],

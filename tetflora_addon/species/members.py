@@ -42,8 +42,8 @@ def expected_members(species: Species) -> Members:
         if species.dead is not None and species.skeleton is None and i <= 1:
             dead += full * _dead_on(species.dead, order, i, cuts, fold)
         if i + 1 < len(species.orders):
-            at, vigor, weight = _laterals(order)
-            stems_there = weight * fold[np.searchsorted(cuts[1:-1], at, side="right")]
+            place, vigor, weight = _laterals(order)
+            stems_there = weight * fold[np.searchsorted(cuts[1:-1], place, side="right")]
             follow = 1 - species.orders[i + 1].count_by_length * (1 - vigor)
             if order.growing is not None:
                 follow = follow * np.clip(vigor / least_length(order), 0, 1)
@@ -61,19 +61,19 @@ def expected_leaf_area(species: Species) -> float:
 
 def _laterals(order: Order) -> tuple[Floats, Floats, Floats | float]:
     """Places (n,) of laterals on a branch of an order, length ratios (n,), and how many each stands for (n,)."""
-    start, fraction, shorter, weight = order.branch_start.mean, EVEN, 1.0, 1.0
-    at = start + (1 - start) * fraction
-    own = order.growing
-    if own is not None and order.branches.mean > 0:
-        nodes = own.laterals
+    start, fraction, short, weight = order.branch_start.mean, EVEN, 1.0, 1.0
+    place = start + (1 - start) * fraction
+    part = order.growing
+    if part is not None and order.branches.mean > 0:
+        nodes = part.laterals
         law = nodes.law(order.branches.mean)
-        base, tip = law.number_at(np.array([start, nodes.until]) * own.now)
+        base, tip = law.number_at(np.array([start, nodes.until]) * part.now)
         tip = base + nodes.kept * (tip - base)
         node, weight, extra = some_nodes((base, tip - nodes.fresh * (tip - base), tip), nodes.extra)
-        at = np.clip(law.place_of(node) / own.now, 0, 1)
+        place = np.clip(law.place_of(node) / part.now, 0, 1)
         fraction = nodes.kept * (node - base) / max(tip - base, 1e-9)
-        shorter = faded(fraction, nodes.kept * (1 - nodes.fresh), extra) * shortened(fraction, own.conical, *own.ramps)
-    return at, shorter * crown_ratio(order.crown, 1 - fraction), weight
+        short = faded(fraction, nodes.kept * (1 - nodes.fresh), extra) * shortened(fraction, part.conical, *part.ramps)
+    return place, short * crown_ratio(order.crown, 1 - fraction), weight
 
 
 def least_length(order: Order) -> float:

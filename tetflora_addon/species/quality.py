@@ -153,14 +153,14 @@ def _thinned(species: Species, members: Members, detail: float) -> Species:
     branches, tiers = members.branches, _tiers(species)
     foliage = _left(max(sum(_numbers(members, species)[1]), 2 * _FEW), detail)
     spurs = _left(members.spurs, detail, _crowd(members.spurs))
-    there = 1.0  # factor on the number of branches of this order
+    factor = 1.0  # on the number of branches of this order
     for i, order in enumerate(species.orders):
         count = 1.0
         if i + 1 < len(branches):
-            count = _allowed(order, "branches", _left(branches[i + 1], detail, _crowd(branches[i + 1])) / there)
-        fewer = _scaled(order, spurs=spurs / there, leaves=foliage / there)
+            count = _allowed(order, "branches", _left(branches[i + 1], detail, _crowd(branches[i + 1])) / factor)
+        fewer = _scaled(order, spurs=spurs / factor, leaves=foliage / factor)
         tiers[i] = replace(fewer, branches=order.branches.scaled(count))
-        there *= count
+        factor *= count
     if species.spur is not None:
         tiers[-1] = _scaled(species.spur, leaves=foliage / spurs)
     return _with_tiers(species, tiers)

@@ -141,11 +141,11 @@ def nurbs_chain(
     spans = np.unique(knots[order - 1 : n + 1]).astype(np.float64)
     if len(spans) < 2:
         return polygon
-    at = np.append((spans[:-1, None] + np.diff(spans)[:, None] * np.arange(steps) / steps).ravel(), spans[-1])
+    marks = np.append((spans[:-1, None] + np.diff(spans)[:, None] * np.arange(steps) / steps).ravel(), spans[-1])
     # The spline's end belongs to its last span.
-    span = np.clip(np.searchsorted(knots, at, side="right") - 1, order - 1, np.searchsorted(knots, spans[-1]) - 1)
+    span = np.clip(np.searchsorted(knots, marks, side="right") - 1, order - 1, np.searchsorted(knots, spans[-1]) - 1)
     basis = (np.arange(n + order - 1) == span[:, None]).astype(np.float64)
-    u = at[:, None]
+    u = marks[:, None]
     for k in range(2, order + 1):
         m = n + order - k
         rise, fall = knots[k - 1 : k - 1 + m] - knots[:m], knots[k : k + m] - knots[1 : m + 1]
@@ -179,7 +179,7 @@ def joined_edges(chains: Chains) -> tuple[Floats, Integers, Integers]:
     margin = np.maximum(points[edges, 3].max(axis=1), near)[:, None]
     low = points[edges, :3].min(axis=1) - margin
     high = points[edges, :3].max(axis=1) + margin
-    found: list[tuple[int, float, Floats]] = []  # edge, fraction along it, and the joint there
+    places: list[tuple[int, float, Floats]] = []  # edge, fraction along it, and the joint there
     for chain in np.flatnonzero(~chains.cyclic):
         for end in (chains.first[chain], chains.first[chain + 1] - 1):
             here = points[end, :3]
@@ -193,14 +193,14 @@ def joined_edges(chains: Chains) -> tuple[Floats, Integers, Integers]:
             if len(gap) and gap.min() <= 1:
                 best = int(gap.argmin())
                 points[end, :3] = on_line[best, :3]
-                found.append((int(close[best]), float(fraction[best, 0]), on_line[best]))
+                places.append((int(close[best]), float(fraction[best, 0]), on_line[best]))
                 break
-    if not found:
+    if not places:
         return points, edges, line
     # Each edge that bears joints becomes a chain through them.
-    bearer, fraction, joints = (np.array(of) for of in zip(*found, strict=True))
+    bearer, fraction, joints = (np.array(of) for of in zip(*places, strict=True))
     order = np.lexsort((fraction, bearer))
-    bearer, new = bearer[order], len(points) + np.arange(len(found))
+    bearer, new = bearer[order], len(points) + np.arange(len(places))
     points = np.concatenate([points, joints[order]])
     first = np.diff(bearer, prepend=-1) != 0
     final = np.diff(bearer, append=-1) != 0
@@ -428,8 +428,8 @@ def skeleton_from_edges(
     strokes = np.zeros(len(points), np.int32)
     if line is not None:
         ends = np.sort(np.stack([order, np.where(parent < 0, order, order[parent])], axis=1), axis=1)
-        found = np.searchsorted(pairs @ (len(merged), 1), ends @ (len(merged), 1))[parent >= 0]
-        strokes[parent >= 0] = np.asarray(line)[stays[first[found]]]
+        matches = np.searchsorted(pairs @ (len(merged), 1), ends @ (len(merged), 1))[parent >= 0]
+        strokes[parent >= 0] = np.asarray(line)[stays[first[matches]]]
     return Skeleton(points, thickest, parent, strokes)
 
 
@@ -459,9 +459,9 @@ def drawn_branches(skeleton: Skeleton) -> DrawnBranches:
     branch = number[top(np.where(leads, parent, index))]
 
     side = heads[~rooted[heads]]
-    own = np.flatnonzero(branch >= 0)
-    entry = np.concatenate([own, parent[side]])
-    at_branch = np.concatenate([branch[own], number[side]])
+    members = np.flatnonzero(branch >= 0)
+    entry = np.concatenate([members, parent[side]])
+    at_branch = np.concatenate([branch[members], number[side]])
     sequence = np.lexsort((entry, at_branch))
     entry = entry[sequence]
     first = np.concatenate([[0], np.cumsum(np.bincount(at_branch, minlength=len(heads)))])
@@ -472,17 +472,17 @@ def drawn_branches(skeleton: Skeleton) -> DrawnBranches:
     arc = _arc(knots, first)
     length = arc[first[1:] - 1]
     place = np.zeros(n)
-    is_own = sequence < len(own)
+    is_own = sequence < len(members)
     place[entry[is_own]] = arc[is_own]
     grown_on = np.where(rooted[heads], -1, branch[before[heads]])
-    at = np.where(grown_on >= 0, np.minimum(place[before[heads]] / np.maximum(length[grown_on], 1e-300), 1.0), 0.0)
+    joint = np.where(grown_on >= 0, np.minimum(place[before[heads]] / np.maximum(length[grown_on], 1e-300), 1.0), 0.0)
     level = generation[heads]
     order = np.minimum(level, MAX_ORDERS - 1).astype(np.int32)
     # See `DrawnBranches`, from the number of forks (b,) below each branch.
-    outward = np.where(level == 2, at, 0.0)
+    outward = np.where(level == 2, joint, 0.0)
     for g in range(3, int(level.max(initial=0)) + 1):
         outward[level == g] = outward[grown_on[level == g]]
-    return DrawnBranches(first, knots, along, order, grown_on.astype(np.int32), at, length, outward)
+    return DrawnBranches(first, knots, along, order, grown_on.astype(np.int32), joint, length, outward)
 
 
 def _roots(points: Floats, pairs: Integers, size: float) -> Integers:
@@ -490,8 +490,8 @@ def _roots(points: Floats, pairs: Integers, size: float) -> Integers:
     n = len(points)
     degree = np.bincount(pairs.reshape(-1), minlength=n)
     away = np.linalg.norm(points, axis=1)
-    there = (degree != 2) & (away <= _AT_ORIGIN * size)
-    order = np.lexsort((points[:, 2], degree != 1, np.where(there, away, np.inf)))
+    at_origin = (degree != 2) & (away <= _AT_ORIGIN * size)
+    order = np.lexsort((points[:, 2], degree != 1, np.where(at_origin, away, np.inf)))
     order = order[degree[order] > 0]
     return order[np.unique(connected(n, *pairs.T)[order], return_index=True)[1]]
 

@@ -162,9 +162,9 @@ def some_nodes(ends: ArrayLike, extra: float) -> tuple[Floats, Floats, Mask]:
     extra : (512,) bool
         Whether they live for a while.
     """
-    base, some, tip = ends
-    weight = np.array([tip - base, extra * (tip - some)])
-    node = np.concatenate([base + (tip - base) * EVEN, some + (tip - some) * EVEN])
+    base, fresh, tip = ends
+    weight = np.array([tip - base, extra * (tip - fresh)])
+    node = np.concatenate([base + (tip - base) * EVEN, fresh + (tip - fresh) * EVEN])
     weight = np.repeat(weight / max(weight.mean(), 1e-12), len(EVEN))
     return node, weight, np.repeat([False, True], len(EVEN))
 

@@ -72,10 +72,10 @@ class Records(Arrays):
         before = np.empty(len(self), bool)
         before[1:], before[:1] = (self.plant[1:] == self.plant[:-1]) & ~late[:-1], False
         after = np.flatnonzero(late & (before | (self.year == year)))
-        there = np.where(before[after], after - 1, after)
-        first, second = self.take(there), self.take(after)
-        span = np.where(after > there, second.year - first.year, 1.0)
-        part = np.where(after > there, (year - first.year) / span, 0.0).astype(np.float32)
+        earlier = np.where(before[after], after - 1, after)
+        first, second = self.take(earlier), self.take(after)
+        span = np.where(after > earlier, second.year - first.year, 1.0)
+        part = np.where(after > earlier, (year - first.year) / span, 0.0).astype(np.float32)
         mixed = {
             name: (a := getattr(first, name)) + (getattr(second, name) - a) * (part if a.ndim == 1 else part[:, None])
             for name in ("position", "height", "diameter", "crown_width", "crown_base", "offset", "lean", "dead")
@@ -373,8 +373,8 @@ class SeedDispersal:
         # Whole numbers, whose sum does not depend on the order: hundredths of a square meter of crown.
         crown = np.rint(np.where(bears, 100.0 * np.pi * plants.radius**2, 0.0))
         for species in range(len(self.outside)):
-            own = plants.species == species
-            sums = np.bincount(place[own], crown[own], self.rows * self.columns).reshape(self.rows, self.columns)
+            alike = plants.species == species
+            sums = np.bincount(place[alike], crown[alike], self.rows * self.columns).reshape(self.rows, self.columns)
             # About a normal distribution, whose mean distance is √(π / 2) standard deviations.
             width = np.sqrt(1.0 + 12.0 / np.pi * self.traits.dispersal[species] ** 2 / area)
             for axis in (0, 1, 0, 1):
@@ -539,8 +539,8 @@ class GrowingStand:
         crowns = plants.crowns(self.traits)
         strips = self.light.fill(crowns)
         taken, disturbed = np.zeros(len(plants)), year == self.settings.years - self.settings.disturbance
-        for index, own in zip(strips, on_all_cores(self.light.taken, range(len(strips))), strict=True):
-            taken[index] = own
+        for index, light in zip(strips, on_all_cores(self.light.taken, range(len(strips))), strict=True):
+            taken[index] = light
 
         def changed(block: slice) -> tuple[Plants, Mask]:
             after = grown(plants, crowns, taken, self.light, self.traits, block)
@@ -586,8 +586,8 @@ class GrowingStand:
         dead = self.dead
         if self.settings.interval and len(dead):
             # Records of the year in which one falls, of the next, when it lies, and of its last.
-            at = record | (dead.falls == year) | (dead.falls == year - 1) | (dead.gone == year)
-            self.kept.append(dead.take(np.flatnonzero(at & (dead.died < year))).records(year))
+            recorded = record | (dead.falls == year) | (dead.falls == year - 1) | (dead.gone == year)
+            self.kept.append(dead.take(np.flatnonzero(recorded & (dead.died < year))).records(year))
         self.dead = dead.take(np.flatnonzero(dead.gone > year))
 
     def finished(self) -> Records:

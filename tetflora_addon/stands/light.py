@@ -203,26 +203,26 @@ class LightGrid:
         """Columns of some crowns, and differences of their leaves along these: rows (r,), (layers, r, columns)."""
         size = self.cell
         x, y = ((values[index] + self.margin) / size for values in (crowns.x, crowns.y))
-        found = covered(x, y, crowns.radius[index] / size)
-        low, high = int(found.row.min(initial=strip.start)), int(found.row.max(initial=strip.start)) + 1
+        squares = covered(x, y, crowns.radius[index] / size)
+        low, high = int(squares.row.min(initial=strip.start)), int(squares.row.max(initial=strip.start)) + 1
         base, height, top = (values[index] for values in (crowns.base, crowns.height, crowns.top))
-        length = np.take(height - base, found.crown)
+        length = np.take(height - base, squares.crown)
         # A cone loses its height with the distance from the middle, a dome half of it with the square of that.
-        cone = np.take(top, found.crown)
-        length *= 1.0 - np.minimum(cone * np.sqrt(found.far) + (1.0 - cone) * 0.6 * found.far, 1.0 - _THIN)
-        leaves = np.take(crowns.leaves[index] / (size**2 * _UNIT), found.crown) * found.part
+        cone = np.take(top, squares.crown)
+        length *= 1.0 - np.minimum(cone * np.sqrt(squares.far) + (1.0 - cone) * 0.6 * squares.far, 1.0 - _THIN)
+        leaves = np.take(crowns.leaves[index] / (size**2 * _UNIT), squares.crown) * squares.part
         density = np.rint(leaves / np.maximum(length, 1e-3))
-        column, area = found.column % self.columns, (high - low) * self.columns
-        place = (found.row - low) * self.columns + column
-        cells, of_layer = (found.row % self.rows) * self.columns + column, self.rows * self.columns
-        length += np.take(base, found.crown)
+        column, area = squares.column % self.columns, (high - low) * self.columns
+        place = (squares.row - low) * self.columns + column
+        cells, of_layer = (squares.row % self.rows) * self.columns + column, self.rows * self.columns
+        length += np.take(base, squares.crown)
         if self.ground is None:
-            foot, under = (np.take(values, found.crown) for values in layer_of(base))
+            foot, under = (np.take(values, squares.crown) for values in layer_of(base))
         else:
-            own = np.take(self._ground(crowns.x[index], crowns.y[index]), found.crown)
-            higher = np.clip(own - np.take(self.ground, cells), -_STEEP, _STEEP)
-            higher[(found.row != cells // self.columns) | (found.column != column)] = 0.0  # around the edge
-            foot, under = layer_of(np.take(base, found.crown) + higher)
+            elevation = np.take(self._ground(crowns.x[index], crowns.y[index]), squares.crown)
+            higher = np.clip(elevation - np.take(self.ground, cells), -_STEEP, _STEEP)
+            higher[(squares.row != cells // self.columns) | (squares.column != column)] = 0.0  # around the edge
+            foot, under = layer_of(np.take(base, squares.crown) + higher)
             length += higher
         head, over = layer_of(length)
         total = np.zeros(layers * area)
@@ -232,7 +232,7 @@ class LightGrid:
             total += np.bincount(index_in, upper, len(total))
             below = np.flatnonzero(layer > 0)
             total += np.bincount(index_in[below] - area, (sign * density - upper)[below], len(total))
-        places = (of.astype(np.int32) for of in (found.crown, foot * of_layer + cells, head * of_layer + cells))
+        places = (of.astype(np.int32) for of in (squares.crown, foot * of_layer + cells, head * of_layer + cells))
         columns = _Columns(len(index), *places, *(of.astype(np.float32) for of in (under, over, density)))
         rows = np.arange(low, high) % self.rows
         return columns, rows, total.astype(np.int32).reshape(layers, high - low, self.columns)
@@ -284,11 +284,11 @@ class LightGrid:
 
     def taken(self, strip: int) -> Floats:
         """Light that the crowns (k,) of a strip take, m² of full light; all together no more than there is."""
-        own = self._columns[strip]
-        light = self._summed(own.foot, own.under)
-        light -= self._summed(own.head, own.over)
-        light *= own.density
-        return np.bincount(own.crown, light, own.number) * (_UNIT * self.cell**2)
+        columns = self._columns[strip]
+        light = self._summed(columns.foot, columns.under)
+        light -= self._summed(columns.head, columns.over)
+        light *= columns.density
+        return np.bincount(columns.crown, light, columns.number) * (_UNIT * self.cell**2)
 
     def _cell(self, row: NDArray, column: NDArray) -> Integers:
         return (row % self.rows) * self.columns + column % self.columns
@@ -313,11 +313,11 @@ def _through(
     near += np.roll(light, wide, axis=1)
     near += np.roll(light, -wide, axis=1)
     mixed = (np.float32(1.0) - 4 * side) * light + side * near
-    own = density[block]
-    own += leaves[block]
+    block_density = density[block]
+    block_density += leaves[block]
     # exp(−x) as one over the fourth power of three terms of exp(x / 4): within a hundredth up to x = 2.5, never 0, and
     # the same on every machine; and (1 − exp(−x)) / x of the same numbers.
-    y = own * np.float32(0.25 * _UNIT * thick)
+    y = block_density * np.float32(0.25 * _UNIT * thick)
     r = np.float32(1.0) + y * (np.float32(0.5) + y * np.float32(1.0 / 6.0))
     q = y * r
     mixed /= np.square(np.square(np.float32(1.0) + q))

@@ -225,19 +225,19 @@ def leaf_meshes(
     lengths_of : callable, optional
         Lengths (n,) of the leaves of branches in the image, in errors that do not show; those of long ones are finer.
     """
-    groups = [group for some in whole for group in _bearers(flora, some)]
+    groups = [group for wood in whole for group in _bearers(flora, wood)]
     if fractions_of is not None:
         groups = [part for group in groups for part in group.parts(*fractions_of(group.whole.branches))]
     if lengths_of is not None:
         groups = [level for group in groups for level in group.levels(lengths_of(group.whole))]
     for kind, step in sorted({(group.kind, group.step) for group in groups}):
-        own = [group for group in groups if (group.kind, group.step) == (kind, step)]
+        bearers = [group for group in groups if (group.kind, group.step) == (kind, step)]
         forms = flora.forms[species][kind]
-        numbers = sum(group.numbers() for group in own)
+        numbers = sum(group.numbers() for group in bearers)
         for form in np.flatnonzero(numbers):
-            given = int(numbers[form]), float(flora.leaf.transmission[own[0].row[0]]), moment(flora.rows) > 0
+            given = int(numbers[form]), float(flora.leaf.transmission[bearers[0].row[0]]), moment(flora.rows) > 0
             copies = _copies(forms[form], step, *given)
-            for group in own:
+            for group in bearers:
                 group.add(copies, int(form), thin)
             if copies.done:
                 yield LeafMesh(kind, int(form), copies.buffers())
@@ -287,10 +287,10 @@ class _LeafBearers:
         """The branches some of whose leaves are wanted as they are, and those with leaves as kites of both kinds."""
         none, every = np.zeros_like(kites), np.ones_like(kites)
         for step, low, high in ((0, planes, every), (_PLANES, kites, planes), (_KITE, none, kites)):
-            own = (fraction > 0.0) & (low < high)
-            if own.any():
-                given = fraction[own], low[own], high[own]
-                yield _LeafBearers(self.flora, int(self.row[0]), self.whole.take(own), step, *given)
+            bearing = (fraction > 0.0) & (low < high)
+            if bearing.any():
+                given = fraction[bearing], low[bearing], high[bearing]
+                yield _LeafBearers(self.flora, int(self.row[0]), self.whole.take(bearing), step, *given)
 
     def levels(self, lengths: Floats) -> Iterator[Self]:
         """The branches by the levels that some of their leaves have; kites stay what they are."""
@@ -300,11 +300,11 @@ class _LeafBearers:
         ends = [[chosen_level(form, lengths * share) for form in self.forms] for share in (_EARLIEST, 1.0)]
         low, high = np.min(ends[0], axis=0), np.max(ends[1], axis=0)
         for step in range(int(high.max(initial=0)) + 1):
-            own = np.flatnonzero((low <= step) & (step <= high))
-            if len(own):
-                given = (None if of is None else of[own] for of in (self.fraction, self.low, self.high))
-                mixed = lengths[own] if (low[own] < high[own]).any() else None
-                yield _LeafBearers(self.flora, int(self.row[0]), self.whole.take(own), step, *given, mixed)
+            bearing = np.flatnonzero((low <= step) & (step <= high))
+            if len(bearing):
+                given = (None if of is None else of[bearing] for of in (self.fraction, self.low, self.high))
+                mixed = lengths[bearing] if (low[bearing] < high[bearing]).any() else None
+                yield _LeafBearers(self.flora, int(self.row[0]), self.whole.take(bearing), step, *given, mixed)
 
     def numbers(self) -> Integers:
         """How many leaves there are of each form."""

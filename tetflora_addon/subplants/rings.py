@@ -126,7 +126,7 @@ class Curve:
     def at(self, branch: Integers, segment: Integers, x: Floats, most: Floats) -> tuple[Floats, Floats]:
         """Places (m, 3) at fractions x (m,) of segments, at most so far (m,) off these, and axes (2, 3, m) across."""
         x = x[:, None]
-        chord, start, end = (some[branch, segment] for some in (self.chord, self.start, self.end))
+        chord, start, end = (vectors[branch, segment] for vectors in (self.chord, self.start, self.end))
         aside = x * (x - 1.0) ** 2 * start + x * x * (x - 1.0) * end
         aside *= np.minimum(1.0, most / np.maximum(_norm(aside), 1e-300))[:, None]
         center = self.lines.knot(branch, segment) + x * chord + aside
@@ -143,23 +143,23 @@ def _curve(flora: Flora, branches: Branches, lines: Axes, weight: Floats) -> Cur
     t = np.minimum(np.arange(most + 1) / lines.segments[:, None], 1.0)
     owner = np.repeat(np.arange(n), most + 1)
     radius = radius_at(flora.rows, _without_places(branches, owner), t.ravel()).reshape(n, most + 1)
-    there = np.arange(most) < lines.segments[:, None]
+    present = np.arange(most) < lines.segments[:, None]
     chord = np.diff(lines.knots, axis=1)
     length = _norm(chord)[..., None]
-    ahead = np.where(there[..., None], lines.frames[..., 2], 0.0)
+    ahead = np.where(present[..., None], lines.frames[..., 2], 0.0)
     # Beyond the tip both are zero, so that the last joint has the direction of its segment.
     none = np.zeros((n, 1, 3))
     tangent = _unit_of(np.concatenate([none, ahead], axis=1) + np.concatenate([ahead, none], axis=1))
-    first = np.where(there[..., None], lines.frames[..., 0], 0.0)
+    first = np.where(present[..., None], lines.frames[..., 0], 0.0)
     across = _unit_of(np.concatenate([none, first], axis=1) + np.concatenate([first, none], axis=1))
     start, end = tangent[:, :-1] * length - chord, tangent[:, 1:] * length - chord
     allowed = _ASIDE * np.minimum(radius[:, :-1], radius[:, 1:])
     share = allowed / np.maximum(2.0 * _HERMITE * np.maximum(_norm(start), _norm(end)), 1e-300)
-    share = np.where(there, np.minimum(share, 1.0), 1.0)
+    share = np.where(present, np.minimum(share, 1.0), 1.0)
     one = np.ones((n, 1))
     joint = np.minimum(np.concatenate([one, share], axis=1), np.concatenate([share, one], axis=1)) * weight[:, None]
     start, end = start * joint[:, :-1, None], end * joint[:, 1:, None]
-    return Curve(lines, chord, np.where(there[..., None], start, 0.0), np.where(there[..., None], end, 0.0), across)
+    return Curve(lines, chord, np.where(present[..., None], start, 0.0), np.where(present[..., None], end, 0.0), across)
 
 
 def parts(deviation: Floats, pixel: Floats) -> Integers:
@@ -221,7 +221,7 @@ def fine_counts(flora: Flora, whole: WholeBranches, fine: Fineness, pixels: Pixe
     """Parts (n, S) of the segments of branches; a branch has a ring more than parts."""
     rows, branches, lines = flora.rows, whole.branches, whole.lines
     n, most = len(branches), lines.frames.shape[1]
-    there = np.arange(most) < lines.segments[:, None]
+    present = np.arange(most) < lines.segments[:, None]
     bent = _curve(flora, branches, lines, fine.weight)
     reach = np.repeat(branches.radius * flora.widest[branches.row], most + 1)
     pixel = pixels.extent(lines.knots.reshape(-1, 3), reach).reshape(n, -1)
@@ -231,18 +231,18 @@ def fine_counts(flora: Flora, whole: WholeBranches, fine: Fineness, pixels: Pixe
     growth = np.maximum(rows["flare"][branches.row], collars(rows, branches)[0])
     out[:, 0] = np.maximum(out[:, 0], parts(growth * branches.radius, 2.0 * pixel[:, 0]))
     out[:, 0] = np.maximum(out[:, 0], rows["rings"][branches.row] + 1)
-    return np.where(there, out, 0)
+    return np.where(present, out, 0)
 
 
 def fine_rings(flora: Flora, whole: WholeBranches, fine: Fineness, counts: Integers) -> Rings:
     """Rings along the curves of branches of one number of sides, so many (n, S) to each segment."""
     rows, branches, segments = flora.rows, whole.branches, whole.lines.segments
     n, most = counts.shape
-    own = counts.copy()
-    own[np.arange(n), segments - 1] += 1 + beyond_tip(rows, branches)
+    ring_counts = counts.copy()
+    ring_counts[np.arange(n), segments - 1] += 1 + beyond_tip(rows, branches)
     sunk = below_base(rows, branches)
-    own[:, 0] += sunk
-    flat, index = spread(own.ravel())
+    ring_counts[:, 0] += sunk
+    flat, index = spread(ring_counts.ravel())
     owner, segment = flat // most, flat % most
     index = np.where(segment == 0, index - sunk[owner], index)
     below, above = index < 0, np.flatnonzero(index > counts[owner, segment])
@@ -250,11 +250,11 @@ def fine_rings(flora: Flora, whole: WholeBranches, fine: Fineness, counts: Integ
     ahead = segment == 0
     x[ahead] = _stretched(x[ahead], _falls(rows, branches, segments)[owner[ahead]])
     t = (segment + x) / segments[owner]
-    some = _without_places(branches, owner)
+    owners = _without_places(branches, owner)
     sides = int(fine.sides[0])
     # As round as it is, the tube has the surface that its species' coarse one has.
     sparse = tube_perimeter(rows["sides"][branches.row]) / tube_perimeter(np.array([sides]))
-    radius = radius_at(rows, some, t) * sparse[owner]
+    radius = radius_at(rows, owners, t) * sparse[owner]
     wider = 1.0 + fine.weight * (_below_forks(rows, branches) - 1.0)
     end = np.clip((t - _WIDENS) / (1.0 - _WIDENS), 0.0, 1.0)
     radius *= 1.0 + (wider[owner] - 1.0) * end * end * (3.0 - 2.0 * end)
@@ -296,10 +296,10 @@ def fine_rings(flora: Flora, whole: WholeBranches, fine: Fineness, counts: Integ
 def foot_rings(flora: Flora, whole: WholeBranches, fine: Fineness) -> tuple[Rings, Integers] | None:
     """Rings of the roots of trunks, and the branch of each root; None without any."""
     rows, branches = flora.rows, whole.branches
-    own = np.flatnonzero(has_foot(rows, branches) & (fine.weight > 0))
-    if not len(own):
+    footed = np.flatnonzero(has_foot(rows, branches) & (fine.weight > 0))
+    if not len(footed):
         return None
-    trunks, weight = branches.take(own), fine.weight[own]
+    trunks, weight = branches.take(footed), fine.weight[footed]
     path, width, which = _roots(rows, trunks, weight)
     many, places = path.shape[:2]
     length = np.linalg.norm(np.diff(path, axis=1), axis=2).sum(axis=1)
@@ -314,7 +314,7 @@ def foot_rings(flora: Flora, whole: WholeBranches, fine: Fineness) -> tuple[Ring
     t = -np.tile(np.linspace(0.0, 1.0, places), many)  # as deep as the foot, for materials: below the base
     reach = (width.ravel() * axes).astype(np.float32)
     still = None if whole.lines.later is None else (center, reach)
-    return Rings(wood, owner, t, center, reach, _goes_on(owner), still), own[which]
+    return Rings(wood, owner, t, center, reach, _goes_on(owner), still), footed[which]
 
 
 def _falls(rows: Table, branches: Branches, segments: Integers) -> Floats:
@@ -429,9 +429,9 @@ def beyond(rows: Table, branches: Branches, branch: Integers, number: Integers) 
     angle = np.pi / 2 * number / _CAP
     deep, narrow = np.where(ball, deep, np.sin(angle)), np.where(ball, narrow, np.maximum(np.cos(angle), 0.0))
     slant = np.where(dead, _SPLINTERS * (0.25 + 0.75 * uniform(branches.key[branch], Draw.BROKEN)), 0.0)
-    at = np.minimum(number, _CAP) - 1
-    deep = np.where(dead, slant * np.array([1.0, 0.85, 0.5])[at], deep)
-    return deep, np.where(dead, np.array([0.96, 0.6, 0.0])[at], narrow), slant
+    ring = np.minimum(number, _CAP) - 1
+    deep = np.where(dead, slant * np.array([1.0, 0.85, 0.5])[ring], deep)
+    return deep, np.where(dead, np.array([0.96, 0.6, 0.0])[ring], narrow), slant
 
 
 def depths(footed: Mask, number: Integers) -> tuple[Floats, Floats]:
@@ -464,9 +464,9 @@ def buttresses(key: Keys) -> tuple[Floats, Floats]:
     """Angles and sizes (n, MOST) of the buttresses of trunks; those that a trunk has not are 0 large."""
     number = root_number(key)[:, None]
     each = np.arange(MOST)
-    own = child_key(key[:, None], _ROOTS + 1 + each)
-    angle = 2 * np.pi * (each + 0.75 * (uniform(own, 0) - 0.5)) / number
-    return angle, np.where(each < number, 0.45 + 0.55 * uniform(own, 1), 0.0)
+    keys = child_key(key[:, None], _ROOTS + 1 + each)
+    angle = 2 * np.pi * (each + 0.75 * (uniform(keys, 0) - 0.5)) / number
+    return angle, np.where(each < number, 0.45 + 0.55 * uniform(keys, 1), 0.0)
 
 
 def root_sides(sides: int) -> int:
@@ -519,18 +519,18 @@ def _roots(rows: Table, trunks: Branches, weight: Floats) -> tuple[Floats, Float
     """
     angle, size = buttresses(trunks.key)
     trunk, which = spread(root_number(trunks.key))
-    own = child_key(trunks.key[trunk], _ROOTS + 64 + which)
+    keys = child_key(trunks.key[trunk], _ROOTS + 64 + which)
     angle, size = angle[trunk, which], size[trunk, which]
     base = trunks.radius[trunk]
     flare = rows["flare"][trunks.row][trunk]
     x = np.linspace(0.0, 1.0, PLACES)
-    away = base[:, None] * (0.5 + 0.4 * flare[:, None] + (1.4 + 1.8 * uniform(own, 0))[:, None] * x)
-    begin = uniform(own, 1)[:, None]
+    away = base[:, None] * (0.5 + 0.4 * flare[:, None] + (1.4 + 1.8 * uniform(keys, 0))[:, None] * x)
+    begin = uniform(keys, 1)[:, None]
     wave = 0.35 * np.sin(2 * np.pi * (begin + 1.1 * x)) - 0.35 * np.sin(2 * np.pi * begin)
     turn = angle[:, None] + wave * x
     width = (base * (0.14 + 0.16 * size) * np.minimum(flare + 0.4, 1.2))[:, None] * (1.0 - 0.72 * x)
     # Nearly level at first, with what is over the ground less and less; sunk as a whole where seen from afar.
-    steep = 0.7 + 0.5 * uniform(own, 2)[:, None]
+    steep = 0.7 + 0.5 * uniform(keys, 2)[:, None]
     bumps = 0.05 * np.sin(9 * x + 6 * angle[:, None]) * x
     high = base[:, None] * (0.3 * size[:, None] * (1 - x) ** 1.5 - steep * x**3 + bumps)
     high = high - (1.0 - weight[trunk])[:, None] * (width + 0.2 * base[:, None])
@@ -569,14 +569,14 @@ def bud_rings(flora: Flora, whole: WholeBranches, fine: Fineness) -> tuple[Rings
     side = np.flatnonzero(~at_end)
     # Leaves are placed branch row by branch row: the same for all where there is one.
     t[side] = leaf_places(rows, branches, owner[side], index[side], number, key[side])
-    some = _without_places(branches, owner)
-    radius = radius_at(rows, some, t)
+    owners = _without_places(branches, owner)
+    radius = radius_at(rows, owners, t)
     sort = [species.bud for species in flora.species]
     table = np.array([(0.0, 0.0) if bud is None else (bud.length, bud.width) for bud in sort])
     color = np.array([(0.0, 0.0, 0.0) if bud is None else bud.color for bud in sort])
-    species = rows["species"][some.row]
+    species = rows["species"][owners.row]
     varied = 1.0 + _VARIED * (2.0 * uniform(key, Draw.LENGTH) - 1.0)
-    length = table[species, 0] * some.scale * varied * np.where(at_end, _AT_END, 1.0) * fine.weight[owner]
+    length = table[species, 0] * owners.scale * varied * np.where(at_end, _AT_END, 1.0) * fine.weight[owner]
     thick = 0.5 * table[species, 1] * length
 
     def placed(lines: Arrays, bearers: Branches) -> tuple[NDArray, NDArray]:

@@ -46,7 +46,7 @@ def tube_buffers(
     MeshBuffers or None
         Quads with ``UVMap``, ``tf_color``, ``tf_transmission`` and ``tf_girth``; None without branches.
     """
-    sorts = [sort for some in whole for sort in _sorts(flora, some, pixels, most_sides)]
+    sorts = [sort for wood in whole for sort in _sorts(flora, wood, pixels, most_sides)]
     sorts.sort(key=attrgetter("sides"))
     if not sorts:
         return None
@@ -89,15 +89,15 @@ class _TubeGroup:
     def made(self, flora: Flora) -> Iterator[tuple[Rings, int, WholeBranches | None]]:
         """Rings, how many vertices they have, and branches within whose bounds they have to stay."""
         if self.fine is None:
-            for some in chunks(self.rings, _RING_BATCH):
-                yield rings_of(flora, self.whole.take(some)), self.sides, None
+            for chunk in chunks(self.rings, _RING_BATCH):
+                yield rings_of(flora, self.whole.take(chunk)), self.sides, None
             return
-        for some in chunks(self.rings * self.sides, 8 * _RING_BATCH):
-            whole, fine = self.whole.take(some), self.fine.take(some)
-            yield fine_rings(flora, whole, fine, self.counts[some]), self.sides, whole
+        for chunk in chunks(self.rings * self.sides, 8 * _RING_BATCH):
+            whole, fine = self.whole.take(chunk), self.fine.take(chunk)
+            yield fine_rings(flora, whole, fine, self.counts[chunk]), self.sides, whole
             for rings_beside, sides_of, _ in BESIDES:
-                if (found := rings_beside(flora, whole, fine)) is not None:
-                    yield found[0], int(sides_of(self.sides)), whole.take(found[1])
+                if (rings := rings_beside(flora, whole, fine)) is not None:
+                    yield rings[0], int(sides_of(self.sides)), whole.take(rings[1])
 
 
 def _sorts(
@@ -113,14 +113,14 @@ def _sorts(
     far = np.flatnonzero(~near)
     rings = whole.lines.segments + flora.rows["rings"][whole.branches.row] + 1
     for k in np.unique(sides[far]):
-        own = far[sides[far] == k]
-        yield _TubeGroup(whole.take(own), int(k), rings[own])
+        group = far[sides[far] == k]
+        yield _TubeGroup(whole.take(group), int(k), rings[group])
     near = np.flatnonzero(near)
     for k in np.unique(fine.sides[near]) if len(near) else ():
-        own = near[fine.sides[near] == k]
-        some, how = whole.take(own), fine.take(own)
-        counts = fine_counts(flora, some, how, pixels)
-        yield _TubeGroup(some, int(k), *ring_sums(flora, some, counts), how, counts)
+        group = near[fine.sides[near] == k]
+        wood, how = whole.take(group), fine.take(group)
+        counts = fine_counts(flora, wood, how, pixels)
+        yield _TubeGroup(wood, int(k), *ring_sums(flora, wood, counts), how, counts)
 
 
 class _Tubes:
@@ -157,8 +157,8 @@ class _Tubes:
         lower = np.flatnonzero(rings.goes_on)
         self._add_shape(self.positions, rings.center.T.astype(np.float32), rings.reach, sides, rings.swelling)
         if inside is not None:
-            own = self.positions[self.vertices : self.vertices + number * sides]
-            keep_inside(flora, inside.branches, np.repeat(rings.branch, sides), own)
+            points = self.positions[self.vertices : self.vertices + number * sides]
+            keep_inside(flora, inside.branches, np.repeat(rings.branch, sides), points)
         if rings.later is not None:
             seconds = moment(flora.rows)
             center = ((rings.later[0] - rings.center) / seconds).T.astype(np.float32)
@@ -199,21 +199,21 @@ class _Tubes:
     def _add_topology(self, base: Integers32, rings: int, sides: int) -> None:
         """Edges around all rings, then edges from those where pieces start (p,) to the next; faces between."""
         here = np.arange(sides, dtype=np.int32)
-        there = np.roll(here, -1)
+        beside = np.roll(here, -1)
         lower = np.int32(self.vertices) + base * np.int32(sides)
         ring_edge = np.int32(self.edges) + base * np.int32(sides)
         long_edge = np.int32(self.edges + rings * sides) + np.arange(0, len(base) * sides, sides, dtype=np.int32)
 
         new = self.edge_verts[self.edges : self.edges + (rings + len(base)) * sides].reshape(-1, 2 * sides)
         first = np.arange(self.vertices, self.vertices + rings * sides, sides, dtype=np.int32)
-        np.add(first[:, None], _interleaved(here, there), out=new[:rings])
+        np.add(first[:, None], _interleaved(here, beside), out=new[:rings])
         np.add(lower[:, None], _interleaved(here, here + sides), out=new[rings:])
         faces = slice(self.faces, self.faces + len(base) * sides)
         new = self.corner_verts[faces].reshape(len(base), -1)
-        np.add(lower[:, None], _interleaved(here, there, there + sides, here + sides), out=new)
+        np.add(lower[:, None], _interleaved(here, beside, beside + sides, here + sides), out=new)
         new = self.corner_edges[faces].reshape(len(base), -1)
         np.add(ring_edge[:, None], _interleaved(here, here + sides), out=new[:, ::2])
-        np.add(long_edge[:, None], _interleaved(there, here), out=new[:, 1::2])
+        np.add(long_edge[:, None], _interleaved(beside, here), out=new[:, 1::2])
 
     def _add_looks(self, low: NDArray, high: NDArray, color: Floats32, sides: int) -> None:
         """Texture coordinates between the v (p,) at both ends of pieces, their colors (p, 3)."""
@@ -265,11 +265,11 @@ def twig_buffers(flora: Flora, whole: WholeBranches, wider: Floats, parts: Integ
     MeshBuffers or None
         Attributes as of `tubes.tube_buffers`; None without branches.
     """
-    straight, some = np.flatnonzero(parts <= 1), np.flatnonzero(parts > 1)
-    made = [_triangles(flora, whole.take(straight), wider[straight])] if len(straight) else []
-    if len(some):
-        made.append(_ribbons(flora, whole.take(some), wider[some], parts[some]))
-    return concatenate_buffers(made)
+    straight, curved = np.flatnonzero(parts <= 1), np.flatnonzero(parts > 1)
+    buffers = [_triangles(flora, whole.take(straight), wider[straight])] if len(straight) else []
+    if len(curved):
+        buffers.append(_ribbons(flora, whole.take(curved), wider[curved], parts[curved]))
+    return concatenate_buffers(buffers)
 
 
 def _triangles(flora: Flora, whole: WholeBranches, times: Floats) -> MeshBuffers:
@@ -306,10 +306,10 @@ def _ribbons(flora: Flora, whole: WholeBranches, times: Floats, parts: Integers)
     ring, number = spread(parts + 1)
     place = number / parts[ring]
     middle, frame = lines.at(ring, place)
-    own = branches.take(ring)
-    sides = flora.rows["sides"][own.row]
-    around = times[ring] * sides * np.sin(np.pi / sides) * radius_at(flora.rows, own, place)
-    half = 0.5 * around[:, None] * _turned(own, frame)
+    owners = branches.take(ring)
+    sides = flora.rows["sides"][owners.row]
+    around = times[ring] * sides * np.sin(np.pi / sides) * radius_at(flora.rows, owners, place)
+    half = 0.5 * around[:, None] * _turned(owners, frame)
     corners = np.stack([middle - half, middle + half], axis=1).reshape(-1, 3)
     velocity = None
     if lines.later is not None:

@@ -182,10 +182,10 @@ def _around_box(window: tuple[float, float, float, float], low: Floats, high: Fl
 def _hexahedron(corners: Floats) -> _Piece:
     """Two quadrilaterals ``(8, 3)``, one shifted against the other, as two prisms, cut at the better diagonal."""
     triangles = [(0, 1, 2), (0, 2, 3), (1, 2, 3), (1, 3, 0)]  # on either side of a diagonal, then of the other
-    found = _best_prisms(corners[[[*triangle, *(i + 4 for i in triangle)] for triangle in triangles]])
-    first, second = (min(found[i][0], found[i + 1][0]) for i in (0, 2))
+    prisms = _best_prisms(corners[[[*triangle, *(i + 4 for i in triangle)] for triangle in triangles]])
+    first, second = (min(prisms[i][0], prisms[i + 1][0]) for i in (0, 2))
     turn = int(second > first)
-    return _Cut(corners[[turn, turn + 2, turn + 4]], found[2 * turn][1], found[2 * turn + 1][1])
+    return _Cut(corners[[turn, turn + 2, turn + 4]], prisms[2 * turn][1], prisms[2 * turn + 1][1])
 
 
 #: Twelve ways (12, 3, 4) to divide a prism into three tetrahedra, by its corners; the last two share a face.
@@ -203,15 +203,15 @@ def _best_prisms(corners: Floats) -> list[tuple[float, _Piece]]:
 
     The paper as well "chooses a subdivision depending on the aspect ratio of the resulting tetrahedra".
     """
-    found = []
+    prisms = []
     for one, qualities in zip(corners, quality(corners[:, _WAYS]).min(axis=2).tolist(), strict=True):
         best, way = -1.0, 0
         for i, worst in enumerate(qualities):
             if worst > best * (1.0 + 1e-9):
                 best, way = worst, i
         first, second, third = one[_WAYS[way]]
-        found.append((best, _Cut(second[:3], first, _Cut(third[:3], second, third))))
-    return found
+        prisms.append((best, _Cut(second[:3], first, _Cut(third[:3], second, third))))
+    return prisms
 
 
 def _hang(tree: TetrahedralTree, node: int, piece: _Piece, camera: ViewingCamera) -> None:

@@ -306,10 +306,10 @@ class TetrahedralTree:
         if (self.children[nodes, 0] >= 0).any() or (len(nodes) and np.bincount(nodes).max() > 1):
             raise ValueError("only terminal nodes can be split, and each only once")
         columns = nodes.astype(np.int32), self.level[nodes] + np.int16(1), self.inside[nodes]
-        made = np.arange(len(self), len(self) + 2 * len(nodes), dtype=np.int32).reshape(-1, 2)
+        children = np.arange(len(self), len(self) + 2 * len(nodes), dtype=np.int32).reshape(-1, 2)
         self._nodes.append(_Nodes.terminal(*(np.repeat(values, 2) for values in columns)))
-        self.children[nodes], self._nodes.rows.plane[nodes] = made, planes
-        return made
+        self.children[nodes], self._nodes.rows.plane[nodes] = children, planes
+        return children
 
     def place(self, nodes: ArrayLike, vertices: ArrayLike) -> None:
         """Give nodes ``(n,)`` that have none their tetrahedra ``(n, 4, 3)``, positively oriented, meters."""
@@ -378,11 +378,11 @@ class TetrahedralTree:
             Node numbers. A point on a plane belongs to side 1.
         """
         points = np.asarray(points, np.float64).reshape(-1, 3)
-        found = np.zeros(len(points), np.int32)
+        terminals = np.zeros(len(points), np.int32)
         for start in range(0, len(points), POINT_BATCH):
             part = slice(start, start + POINT_BATCH)
-            found[part] = self._descend(points[part])
-        return found
+            terminals[part] = self._descend(points[part])
+        return terminals
 
     def _tetrahedra(self, nodes: Integers) -> Floats:
         vertices = self.vertices(nodes)
@@ -394,10 +394,10 @@ class TetrahedralTree:
         node = np.zeros(len(points), np.int32)
         moving = np.arange(len(points) if self.children[0, 0] >= 0 else 0)
         while len(moving):
-            at = node[moving]
-            side = plane_distance(self.planes(at), points[moving]) >= 0.0
-            node[moving] = at = self.children[at, side.astype(np.intp)]
-            moving = moving[self.children[at, 0] >= 0]
+            current = node[moving]
+            side = plane_distance(self.planes(current), points[moving]) >= 0.0
+            node[moving] = current = self.children[current, side.astype(np.intp)]
+            moving = moving[self.children[current, 0] >= 0]
         return node
 
     def _levels_of_inner(self) -> list[Integers]:

@@ -185,7 +185,7 @@ def test_materials_of_the_artist_are_left_alone():
     own = bpy.data.materials.new("mine")
     graph = nodes.Graph(compat.shader_tree(own))
     graph.node("ShaderNodeOutputMaterial", {"Surface": graph.node("ShaderNodeBsdfDiffuse")})
-    stands_for_it = materials.proxy_material(own=True)
+    stands_for_it = materials.proxy_material(asset=True)
     before = [_nodes(one.node_tree) for one in (own, stands_for_it)]
     snow.fit([own, stands_for_it, None])
     assert [_nodes(one.node_tree) for one in (own, stands_for_it)] == before

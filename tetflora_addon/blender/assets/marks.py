@@ -79,8 +79,8 @@ def _read_one(mesh: bpy.types.Mesh, materials: list[bpy.types.Material | None], 
     faces = members(mesh.loop_triangles, "polygon_index", dtype=np.int32)
     factor = 1.0
     if len(triangles) > _TRIANGLES:
-        some = np.linspace(0, len(triangles) - 1, _TRIANGLES).astype(np.int64)
-        triangles, faces, factor = triangles[some], faces[some], len(triangles) / _TRIANGLES
+        sample = np.linspace(0, len(triangles) - 1, _TRIANGLES).astype(np.int64)
+        triangles, faces, factor = triangles[sample], faces[sample], len(triangles) / _TRIANGLES
     corners = positions[read(mesh, ".corner_vert")[triangles]]
     normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     area = 0.5 * factor * np.sqrt(np.einsum("ni,ni->n", normal, normal))
@@ -107,25 +107,25 @@ def _measure(variants: Iterable[tuple[Target, Floats]], depsgraph: bpy.types.Dep
 
     Each variant has a matrix (4, 4) from its space to that of the plant. Nothing where none has a face.
     """
-    found, looks = [], Looks()
+    figures, looks = [], Looks()
     for target, matrix in variants:
         meshes = [_read_one(*one, matrix @ part.matrices, looks) for part, *one in target.meshes(depsgraph)]
         if meshes:
-            found.append(_measured(meshes, picture=not found))
-    if not found:
+            figures.append(_measured(meshes, picture=not figures))
+    if not figures:
         return {}
-    means = {name: np.mean([one[name] for one in found], axis=0).tolist() for name in found[0] if name != "picture"}
-    return means | {"picture": found[0]["picture"]}
+    means = {name: np.mean([one[name] for one in figures], axis=0).tolist() for name in figures[0] if name != "picture"}
+    return means | {"picture": figures[0]["picture"]}
 
 
 def size_of(variants: Iterable[tuple[Target, Floats]], depsgraph: bpy.types.Depsgraph) -> tuple[float, float]:
     """Radius and height alone, as `_measure` finds them, at a fraction of the cost; zeros where nothing has a face."""
-    found = []
+    extents = []
     for target, matrix in variants:
         boxes = [(low, high, matrix @ places) for low, high, places in _boxes(target, depsgraph)]
         if boxes:
-            found.append(_extent(*_around(boxes)))
-    return tuple(np.mean(found, axis=0).tolist()) if found else (0.0, 0.0)
+            extents.append(_extent(*_around(boxes)))
+    return tuple(np.mean(extents, axis=0).tolist()) if extents else (0.0, 0.0)
 
 
 def reach_of(target: Target, depsgraph: bpy.types.Depsgraph) -> float:
@@ -188,11 +188,11 @@ def _sampled(meshes: list[_Mesh]) -> tuple[Floats, Floats, Floats]:
     draw = np.random.default_rng(1)
     out: list[tuple[NDArray, NDArray, NDArray]] = []
     for mesh in meshes:
-        own = float(mesh.area.sum())
-        number = int(np.ceil(_POINTS * mesh.sizes * own / total)) if own > 0.0 else 0
+        area = float(mesh.area.sum())
+        number = int(np.ceil(_POINTS * mesh.sizes * area / total)) if area > 0.0 else 0
         if not number:
             continue
-        triangle = draw.choice(len(mesh.area), number, p=mesh.area / own)
+        triangle = draw.choice(len(mesh.area), number, p=mesh.area / area)
         triangle = triangle[draw.random(number) < mesh.coverage[triangle]]
         place = mesh.places[draw.integers(len(mesh.places), size=len(triangle))]
         corners = mesh.corners[triangle]
@@ -292,16 +292,16 @@ def _identifier(datablock: Datablock) -> str:
     taken = {entry.identifier for entry in entries_of()}
     kind = "collection" if isinstance(datablock, bpy.types.Collection) else "object"
     texts = (f"{kind}:{datablock.name_full}:{number}".encode(errors="backslashreplace") for number in count())
-    made = (PREFIX + blake2b(text, digest_size=6).hexdigest() for text in texts)
-    return next(identifier for identifier in made if identifier not in taken)
+    candidates = (PREFIX + blake2b(text, digest_size=6).hexdigest() for text in texts)
+    return next(identifier for identifier in candidates if identifier not in taken)
 
 
 def measure_again(depsgraph: bpy.types.Depsgraph, entry: TetFloraAssetSpecies) -> bool:
     """Measure an asset and draw its picture; false where it has no faces."""
-    found = _measure(variants_of(entry, depsgraph), depsgraph)
-    for name, value in ({"name": (entry.object or entry.collection).name} | found if found else {}).items():
+    means = _measure(variants_of(entry, depsgraph), depsgraph)
+    for name, value in ({"name": (entry.object or entry.collection).name} | means if means else {}).items():
         setattr(entry, name, value)
-    return bool(found)
+    return bool(means)
 
 
 def measure_all(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, identifiers: Iterable[str]) -> None:
@@ -349,15 +349,15 @@ def scattered(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Scatter:
     SceneError
         Nothing that has faces, or as `places.read_scatters`; the message says what to do.
     """
-    found = read_scatters([obj], depsgraph)[obj]
-    if not found.places:
-        if found.left:
+    scatter = read_scatters([obj], depsgraph)[obj]
+    if not scatter.places:
+        if scatter.left:
             raise SceneError(
-                f'"{obj.name}" scatters only objects without faces ({", ".join(sorted(found.left)[:3])}); nothing of '
+                f'"{obj.name}" scatters only objects without faces ({", ".join(sorted(scatter.left)[:3])}); nothing of '
                 "them can be refined"
             )
         raise SceneError(
             f'"{obj.name}" shows no instances now. Show its modifiers in viewports, and keep them from realizing '
             "instances; for a mesh of its own use Refine This Mesh"
         )
-    return found
+    return scatter

@@ -144,9 +144,9 @@ _ROLE = ("is_plant", "is_field", "is_explicit", "is_occluder", "is_scatter", "en
 
 def _settings_in(owner: bpy.types.bpy_struct, deepest: int = 4) -> list[tuple[str, object]]:
     names = [p.identifier for p in owner.bl_rna.properties if p.identifier not in _COMMON and p.type != 'COLLECTION']
-    found = {name: getattr(owner, name) for name in names}
-    inner = {n: v for n, v in found.items() if deepest and isinstance(v, bpy.types.bpy_struct) and _plain(v) is None}
-    return [(n, _settings_in(v, deepest - 1) if n in inner else _plain(v)) for n, v in found.items()]
+    settings = {name: getattr(owner, name) for name in names}
+    inner = {n: v for n, v in settings.items() if deepest and isinstance(v, bpy.types.bpy_struct) and _plain(v) is None}
+    return [(n, _settings_in(v, deepest - 1) if n in inner else _plain(v)) for n, v in settings.items()]
 
 
 def form_steps(obj: bpy.types.Object, deepest: int = DEEPEST) -> Generator[None, None, str]:
@@ -253,17 +253,17 @@ class _Parts:
     def _one_by_one(self, obj: bpy.types.Object, matrices: Floats) -> None:
         """Instances on vertices and faces, and of particles, which only Blender's own list has."""
         back = np.linalg.pinv(world_matrix(obj, self._depsgraph).astype(np.float64))
-        found: dict[bpy.types.Object, list[Floats]] = {}
+        instances: dict[bpy.types.Object, list[Floats]] = {}
         for _, instance in listed_instances(self._depsgraph, (obj,)):
             if instance.object.original != obj:
                 place = back @ np.array(instance.matrix_world, dtype=np.float64)
-                found.setdefault(instance.object.original, []).append(place)
-        if not found:
+                instances.setdefault(instance.object.original, []).append(place)
+        if not instances:
             self.warnings.append(
                 f'What "{obj.name}" instances on vertices, faces or particles is left out of "{self._name}", because '
                 "it is not in the scene; link it to the scene, or make its instances real"
             )
-        for shown, places in found.items():
+        for shown, places in instances.items():
             self._own(shown, (matrices[:, None] @ np.array(places)).reshape(-1, 4, 4))
 
     def _own(self, obj: bpy.types.Object, matrices: Floats) -> None:
@@ -277,8 +277,8 @@ class _Parts:
         evaluated = _evaluated(obj, self._depsgraph)
         if obj.type == 'MESH':
             # Objects that share a mesh and its materials are one.
-            own = tuple(s.material for s in obj.material_slots if s.link == 'OBJECT')
-            self._add((evaluated.data.as_pointer(), own), AssetPart(obj.name, obj), matrices)
+            materials = tuple(s.material for s in obj.material_slots if s.link == 'OBJECT')
+            self._add((evaluated.data.as_pointer(), materials), AssetPart(obj.name, obj), matrices)
         else:
             self._add(obj, AssetPart(obj.name, obj), matrices)
 
@@ -437,12 +437,12 @@ def _surface_steps(
         corner_verts = read(mesh, ".corner_vert")
         looks = reader.prepare(mesh, slots)
     yield 0.0
-    found = yield from looks.steps(faces, positions, loops, corner_verts, face)
+    face_looks = yield from looks.steps(faces, positions, loops, corner_verts, face)
     # Vertices of triangles from their corners, in the same array.
     for start in range(0, len(loops), _TRIANGLES):
         piece = loops[start : start + _TRIANGLES]
         piece[:] = np.take(corner_verts, piece)
-    return AssetSurface(name=part.name, positions=positions, triangles=loops, face=face, **found)
+    return AssetSurface(name=part.name, positions=positions, triangles=loops, face=face, **face_looks)
 
 
 #: Instances up to which something that has nothing else is a group of assets; what has more is an asset of many parts.
@@ -493,11 +493,11 @@ def read_places(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> list[
         A transform that is not a number, a species whose collection has no object with faces, or a marked object of a
         kind that cannot be read; the message names the object.
     """
-    found = _plant_places(scene, depsgraph)
+    places = _plant_places(scene, depsgraph)
     marked = sorted((o for o in renderable_objects(depsgraph.view_layer) if is_scatter(o)), key=lambda o: o.name_full)
     for scatter in read_scatters(marked, depsgraph).values():
-        found += scatter.places
-    return found
+        places += scatter.places
+    return places
 
 
 def _plant_places(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> list[Places]:
@@ -508,10 +508,10 @@ def _plant_places(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> lis
     read = read_asset_plants(scene, depsgraph)
     species = asset_species(scene)
     variants = {one: variants_of(species[one], depsgraph) for one in {plants.species for plants in read}}
-    found = []
+    places = []
     for plants in read:
-        found += _by_variant(plants, variants[plants.species])
-    return found
+        places += _by_variant(plants, variants[plants.species])
+    return places
 
 
 Variant = tuple[Target, Floats]
@@ -545,15 +545,15 @@ def variants_of(entry: TetFloraAssetSpecies, depsgraph: bpy.types.Depsgraph) -> 
         while top.parent in held:
             top = top.parent
         trees.setdefault(top, []).append(part)
-    found = [_as_it_stands(trunk, depsgraph, parts) for trunk, parts in trees.items()]
+    variants = [_as_it_stands(trunk, depsgraph, parts) for trunk, parts in trees.items()]
     children = sorted(entry.collection.children, key=lambda c: c.name_full)
-    found += [(_target(child), np.eye(4)) for child in children if not child.hide_render]
-    found = [variant for variant in found if any(variant[0].meshes(depsgraph))]
-    if not found:
+    variants += [(_target(child), np.eye(4)) for child in children if not child.hide_render]
+    variants = [variant for variant in variants if any(variant[0].meshes(depsgraph))]
+    if not variants:
         raise SceneError(
             f'The collection "{entry.collection.name}", which is used as a species, has no object with faces; add some'
         )
-    return found
+    return variants
 
 
 def _as_it_stands(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph, parts: Sequence = ()) -> Variant:
@@ -572,16 +572,16 @@ def _by_variant(plants: AssetPlants, variants: list[Variant]) -> list[Places]:
     chosen = np.zeros(len(keys), np.int64)
     if len(variants) > 1:
         chosen[:] = uniform(child_key(keys, _VARIANT), 0) * len(variants)
-    found = []
+    places = []
     for number, (target, turned) in enumerate(variants):
-        own = np.flatnonzero(chosen == number)
-        matrices = (plants.matrices[own].reshape(-1, 4) @ turned).reshape(-1, 4, 4)
+        rows = np.flatnonzero(chosen == number)
+        matrices = (plants.matrices[rows].reshape(-1, 4) @ turned).reshape(-1, 4, 4)
         whole = _sizeable(matrices)
         if whole.any():
-            own, matrices = own[whole], matrices[whole]
-            owners = plants.owners if len(plants.owners) == 1 else tuple(plants.owners[i] for i in own.tolist())
-            found.append(Places(target, matrices, keys[own], owners))
-    return found
+            rows, matrices = rows[whole], matrices[whole]
+            owners = plants.owners if len(plants.owners) == 1 else tuple(plants.owners[i] for i in rows.tolist())
+            places.append(Places(target, matrices, keys[rows], owners))
+    return places
 
 
 def read_scatters(objects: list[bpy.types.Object], depsgraph: bpy.types.Depsgraph) -> "dict[bpy.types.Object, Scatter]":
@@ -592,18 +592,18 @@ def read_scatters(objects: list[bpy.types.Object], depsgraph: bpy.types.Depsgrap
     SceneError
         A transform that is not a number; the message names the object.
     """
-    found, slow = {}, []
+    scatters, slow = {}, []
     for obj in objects:
-        walk = found[obj] = Scatter(obj, depsgraph)
+        walk = scatters[obj] = Scatter(obj, depsgraph)
         if is_listed(obj):
             slow.append(obj)
         else:
             walk.within(obj, world_matrix(obj, depsgraph)[None].astype(np.float64), name_keys([obj]))
     if slow:
-        _one_by_one({obj: found[obj] for obj in slow}, depsgraph)
-    for walk in found.values():
+        _one_by_one({obj: scatters[obj] for obj in slow}, depsgraph)
+    for walk in scatters.values():
         walk.finish()
-    return found
+    return scatters
 
 
 def _target(datablock: bpy.types.Object | bpy.types.Collection) -> Target:
@@ -625,7 +625,7 @@ class Scatter:
         """Gather the places of each target."""
         for target, parts in self._parts.items():
             columns = zip(*parts, strict=True)
-            matrices, keys = (own[0] if len(own) == 1 else np.concatenate(own) for own in columns)
+            matrices, keys = (arrays[0] if len(arrays) == 1 else np.concatenate(arrays) for arrays in columns)
             bad = int((~np.isfinite(matrices).all(axis=(1, 2))).sum())
             if bad:
                 raise SceneError(

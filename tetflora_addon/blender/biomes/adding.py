@@ -73,18 +73,18 @@ def add_biome_steps(data: JobData, biome: Biome, grounds: Sequence[Object], seed
     with restored(scene):
         renamed = _own_species(scene, biome)
         group, uid = scene.tetflora, uuid.uuid4().hex
-        made = group.layers.add()
-        made.kind, made.uid, made.name, made.source = BIOME, uid, free_name(group.layers, biome.name), biome.identifier
-        made.gives_way, made.slope_max = biome.gives_way, pi / 2
-        made.data = json.dumps({"ground": biome.ground, "season": biome.season}, ensure_ascii=False)
+        zone = group.layers.add()
+        zone.kind, zone.uid, zone.name, zone.source = BIOME, uid, free_name(group.layers, biome.name), biome.identifier
+        zone.gives_way, zone.slope_max = biome.gives_way, pi / 2
+        zone.data = json.dumps({"ground": biome.ground, "season": biome.season}, ensure_ascii=False)
         for obj in grounds:
-            made.grounds.add().object = obj
+            zone.grounds.add().object = obj
         for key, value in (biome.limits | biome.mask).items():
-            set_setting(made, key, value)
-        _keep_found(made, grounds)
-        made.use_altitude = bool({"altitude_min", "altitude_max"} & biome.limits.keys())
+            set_setting(zone, key, value)
+        _keep_found(zone, grounds)
+        zone.use_altitude = bool({"altitude_min", "altitude_max"} & biome.limits.keys())
         if "path_max" in biome.limits:
-            made.paths = make_line(scene, f"{made.name} line", grounds)
+            zone.paths = make_line(scene, f"{zone.name} line", grounds)
         stands = [layer for layer in biome.layers if layer["kind"] == "stand"]
         grown = yield from _grown(
             [layer["name"] for layer in stands],
@@ -114,9 +114,9 @@ def add_biome_steps(data: JobData, biome: Biome, grounds: Sequence[Object], seed
 def _lay_on(population: PropertyGroup, grounds: Sequence[Object]) -> None:
     """Let a layer that was read grow on those of the grounds that it names or, without any, on all of them."""
     named = {entry.object for entry in population.grounds}
-    own = [obj for obj in grounds if obj in named] or grounds
-    set_grounds(population, own)
-    _keep_found(population, own)
+    targets = [obj for obj in grounds if obj in named] or grounds
+    set_grounds(population, targets)
+    _keep_found(population, targets)
 
 
 def _keep_found(layer: PropertyGroup, grounds: Sequence[Object]) -> None:
@@ -145,7 +145,7 @@ def plant_biome_steps(data: JobData, biome: PropertyGroup) -> Job[BiomeResult]:
 
 def _grown(names: list[str], grow: Callable[[int], Job[GrownStand]]) -> Job[tuple[list[tuple[str, int]], list[str]]]:
     """Grow stands by their numbers: names and numbers of plants of those that grew, and why others did not."""
-    made, bare = [], []
+    stands, bare = [], []
     for number, name in enumerate(names):
         begin, end = (_STANDS * n / len(names) for n in (number, number + 1))
         try:
@@ -157,8 +157,8 @@ def _grown(names: list[str], grow: Callable[[int], Job[GrownStand]]) -> Job[tupl
             text = str(error)  # some begin with the name of the field
             bare.append(text if text.startswith(f'"{name}"') else f"{name}: {text}")
             continue
-        made.append((name, grown.plants))
-    return made, bare
+        stands.append((name, grown.plants))
+    return stands, bare
 
 
 def _plant(data: JobData, uid: str, stands: Sequence[tuple[str, int]], without: Sequence[str]) -> Job[BiomeResult]:
@@ -180,16 +180,16 @@ def _plant(data: JobData, uid: str, stands: Sequence[tuple[str, int]], without: 
         begin, end = (first + n / len(names) * (1.0 - _SOIL - first) for n in (number, number + 1))
         try:
             with closing(make_plants_steps(scene, depsgraph, population, names[number + 1 :])) as steps:
-                made = yield from part_of(steps, begin, end, title)
+                planted = yield from part_of(steps, begin, end, title)
         except GoneError:
             raise
         except SceneError as error:
             bare.append(f"{title}: {error}")
             continue
-        if made.number or not made.reason:
-            layers.append((title, made.number))
+        if planted.number or not planted.reason:
+            layers.append((title, planted.number))
         else:
-            bare.append(f"{title}: {made.reason}")
+            bare.append(f"{title}: {planted.reason}")
     if bare and not layers:
         raise SceneError(bare[0])
     yield Progress(1.0 - _SOIL, "Soil")
@@ -301,10 +301,10 @@ def make_line(scene: Scene, name: str, grounds: Iterable[Object]) -> Collection:
     spline = curve.splines.new('POLY')
     spline.points.add(len(x) - 1)
     spline.points.foreach_set("co", np.stack([x, y, 0.0 * x + low, 0.0 * x + 1.0], axis=1).ravel().tolist())
-    made = bpy.data.collections.new(name)
-    scene.collection.children.link(made)
-    made.objects.link(bpy.data.objects.new(name, curve))
-    return made
+    collection = bpy.data.collections.new(name)
+    scene.collection.children.link(collection)
+    collection.objects.link(bpy.data.objects.new(name, curve))
+    return collection
 
 
 def lay_biome_soil(depsgraph: Depsgraph, grounds: Sequence[Object]) -> list[str]:
@@ -322,25 +322,25 @@ def lay_biome_soil(depsgraph: Depsgraph, grounds: Sequence[Object]) -> list[str]
     cells = sheet.rows * sheet.columns
     on_it = set(fits)
     # Groups of the artist's own layers have no file, which says what soil is like.
-    found = [b for b in biomes_in(depsgraph.scene) if b.source and on_it & {entry.object for entry in b.grounds}]
-    if not found:
+    biomes = [b for b in biomes_in(depsgraph.scene) if b.source and on_it & {entry.object for entry in b.grounds}]
+    if not biomes:
         return []
     earth, turf, share, here = np.zeros((cells, 3)), np.zeros((cells, 3)), np.zeros(cells), np.full(cells, 1e-9)
     hidden, color = np.zeros(cells), np.zeros((cells, 3))
-    for biome in found:
+    for biome in biomes:
         ground = data_of(biome).get("ground", {})
         value = {name: np.array(ground.get(name, GROUND[name][0])) for name in ("earth", "turf", "turf_share")}
-        own = np.full(cells, 1e-6)
+        density = np.full(cells, 1e-6)
         for low, cell, area, colors in _low_plants(depsgraph, biome.uid, sheet):
-            own += np.bincount(cell, minlength=cells)
+            density += np.bincount(cell, minlength=cells)
             if low:
                 hidden += np.bincount(cell, area, cells)
                 color += np.stack([np.bincount(cell, area * c, cells) for c in colors.T], axis=1)
-        own = _blurred(own.reshape(sheet.rows, sheet.columns)).reshape(-1)
-        here += own
-        earth += own[:, None] * value["earth"]
-        turf += own[:, None] * value["turf"]
-        share += own * value["turf_share"]
+        density = _blurred(density.reshape(sheet.rows, sheet.columns)).reshape(-1)
+        here += density
+        earth += density[:, None] * value["earth"]
+        turf += density[:, None] * value["turf"]
+        share += density * value["turf_share"]
     earth, turf, share = earth / here[:, None], turf / here[:, None], share / here
     square = sheet.cell**2
     lying = 1.0 - np.exp(-hidden / square)

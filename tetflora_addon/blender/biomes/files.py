@@ -143,8 +143,8 @@ def biome_data(
     parts = [part for layer in (*stands, *layers) for part in layer["species"]]
     names = {part.get("shed_by", "") for part in parts} - {""}  # what they shed is made from them
     names |= {part["species"] for part in parts if not part["species"].startswith(part.get("shed_by", "?") + "_")}
-    own = [name for name in sorted(names) if find_edit(scene, name) is not None]
-    more: dict[str, Any] = {"species": {name: dict(species_data(scene, name)) for name in own}}
+    edited = [name for name in sorted(names) if find_edit(scene, name) is not None]
+    more: dict[str, Any] = {"species": {name: dict(species_data(scene, name)) for name in edited}}
     if biome is not None:
         limits = limits_of_zone(biome)
         changed = {
@@ -256,8 +256,8 @@ def saved_populations(scene: Scene) -> list[PropertyGroup]:
     active = active_population(scene)
     if active is None:
         return []
-    own = set(grounds_of(scene, active))
-    return [p for p in scene.tetflora.layers if p.uid == active.uid or own & set(grounds_of(scene, p))]
+    grounds = set(grounds_of(scene, active))
+    return [p for p in scene.tetflora.layers if p.uid == active.uid or grounds & set(grounds_of(scene, p))]
 
 
 def save_biome(scene: Scene, name: str, description: str, picture: bool, replace: bool) -> Path:
@@ -317,8 +317,8 @@ def _last_render(scene: Scene, folder: Path) -> Path:
     try:
         image.scale(*_SIDES)
         image.file_format = 'JPEG'
-        made = folder / "picture.jpg"
-        image.save(filepath=str(made), quality=_QUALITY)
+        picture = folder / "picture.jpg"
+        image.save(filepath=str(picture), quality=_QUALITY)
     finally:
         bpy.data.images.remove(image)
-    return made
+    return picture

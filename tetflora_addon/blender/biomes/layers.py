@@ -104,11 +104,11 @@ def copy_layer(scene: bpy.types.Scene, source: Layer, grounds: Sequence[bpy.type
 
     Fields are copied with their plants; on other grounds, stands are due.
     """
-    old, made = source.uid, {}
+    old, copies = source.uid, {}
     for uid in [old, *(one.uid for one in children_of(source))]:
-        made[uid] = _copy_one(scene, uid, grounds, made.get(old, ""))
-    _tidy(scene, made[old])
-    return scene.tetflora.layers[index_of(scene, made[old])]
+        copies[uid] = _copy_one(scene, uid, grounds, copies.get(old, ""))
+    _tidy(scene, copies[old])
+    return scene.tetflora.layers[index_of(scene, copies[old])]
 
 
 def _copy_one(scene: bpy.types.Scene, uid: str, grounds: Sequence[bpy.types.Object] | None, biome: str) -> str:
@@ -141,11 +141,11 @@ def _copy_one(scene: bpy.types.Scene, uid: str, grounds: Sequence[bpy.types.Obje
 
 def _blocks(layers: Sequence[Layer]) -> list[list[str]]:
     """Identities of the layers that move together: a biome with its own, all others alone."""
-    there = {layer.uid for layer in layers if layer.kind == BIOME}
-    found: dict[str, list[str]] = {}
+    biomes = {layer.uid for layer in layers if layer.kind == BIOME}
+    blocks: dict[str, list[str]] = {}
     for layer in layers:
-        found.setdefault(layer.biome if layer.biome in there else layer.uid, []).append(layer.uid)
-    return [sorted(block, key=lambda uid: uid not in there) for block in found.values()]
+        blocks.setdefault(layer.biome if layer.biome in biomes else layer.uid, []).append(layer.uid)
+    return [sorted(block, key=lambda uid: uid not in biomes) for block in blocks.values()]
 
 
 def move_layer(scene: bpy.types.Scene, step: int) -> bool:
@@ -157,11 +157,11 @@ def move_layer(scene: bpy.types.Scene, step: int) -> bool:
     blocks = _blocks(group.layers)
     within = next((block for block in blocks if layer.uid in block[1:]), None)
     rows: list = blocks if within is None else within
-    own = next(n for n, row in enumerate(rows) if layer.uid == row or (within is None and layer.uid in row))
+    index = next(n for n, row in enumerate(rows) if layer.uid == row or (within is None and layer.uid in row))
     first = 0 if within is None else 1  # a biome stays above its layers
-    if not first <= own + step < len(rows):
+    if not first <= index + step < len(rows):
         return False
-    rows.insert(own + step, rows.pop(own))
+    rows.insert(index + step, rows.pop(index))
     sort_layers(scene, [uid for block in blocks for uid in block], layer.uid)
     return True
 
@@ -173,15 +173,15 @@ def group_layer(scene: bpy.types.Scene) -> bool:
     """
     layers, layer = scene.tetflora.layers, active_layer(scene)
     blocks, uid = _blocks(layers), layer.uid
-    own = next((n for n, block in enumerate(blocks) if block == [uid]), -1)
-    if own < 0 or layer.kind == BIOME:
+    index = next((n for n, block in enumerate(blocks) if block == [uid]), -1)
+    if index < 0 or layer.kind == BIOME:
         return False
-    above = blocks[own - 1] if own else []
+    above = blocks[index - 1] if index else []
     if above and layers[index_of(scene, above[0])].kind == BIOME:
         _put_into(layer, above[0])
     else:
-        made = add_population(scene, grounds_of(scene, rules_of(layer)), name="Group")
-        made.kind, made.limits, made.gives_way, group = BIOME, set(), False, made.uid
+        zone = add_population(scene, grounds_of(scene, rules_of(layer)), name="Group")
+        zone.kind, zone.limits, zone.gives_way, group = BIOME, set(), False, zone.uid
         for one in (*above, uid):
             _put_into(layers[index_of(scene, one)], group)
     _tidy(scene, uid)

@@ -70,8 +70,8 @@ def biomes() -> dict[str, FileInfo]:
     global _seen
     now = time.monotonic()
     if _seen is None or now - _seen[0] >= _TRUSTED:
-        found = files_in((builtin_folder(), *reversed(_own_folders())), "add the biome")
-        _seen = now, dict(sorted(found.items(), key=lambda item: item[1].name.lower()))
+        infos = files_in((builtin_folder(), *reversed(_own_folders())), "add the biome")
+        _seen = now, dict(sorted(infos.items(), key=lambda item: item[1].name.lower()))
     return _seen[1]
 
 
@@ -91,11 +91,11 @@ def items(_owner: object = None, _context: bpy.types.Context | None = None) -> l
     known = biomes()
     if _items is not None and _items[0] is known:
         return _items[1]
-    found = [
+    entries = [
         (i.identifier, i.name, i.description, icon_of(i) or FALLBACK_ICON, number_of(i.identifier))
         for i in known.values()
     ] or [(NO_BIOME, "No biomes found", "The library is empty", 'ERROR', 0)]
-    _items = known, _kept.setdefault(tuple(found), found)
+    _items = known, _kept.setdefault(tuple(entries), entries)
     return _items[1]
 
 

@@ -252,8 +252,8 @@ def _export(options: argparse.Namespace) -> dict:
     if options.variants > MOST_VARIANTS or options.levels > LEVELS:
         raise SceneError(f"There are at most {MOST_VARIANTS:,} variants and {LEVELS} levels; give a smaller number")
     order = ExportOrder(_named(options.path), options.variants, options.levels, options.polygons, not options.flat)
-    found = worker.run_to_end(export_steps(bpy.context.scene, bpy.context.evaluated_depsgraph_get(), order))
-    return asdict(found) | {"path": str(found.path)}
+    exported = worker.run_to_end(export_steps(bpy.context.scene, bpy.context.evaluated_depsgraph_get(), order))
+    return asdict(exported) | {"path": str(exported.path)}
 
 
 def _check_file() -> None:

@@ -64,7 +64,7 @@ class Shown:
 
 def kinds_of(data: JobData, seeds: Seeds, most: int) -> Job[list[PlantKind]]:
     """Kinds of plants, each compiled, and how many variants each gets of those of its species."""
-    scene, found = data.scene, []
+    scene, kinds = data.scene, []
     counts = np.bincount(seeds.species, minlength=len(seeds.identifiers))
     species = [species_of(kind) for kind in seeds.identifiers]
     of_species = {one: sum(counts[n] for n, other in enumerate(species) if other == one) for one in species}
@@ -73,8 +73,8 @@ def kinds_of(data: JobData, seeds: Seeds, most: int) -> Job[list[PlantKind]]:
         yield Progress(0.0, f"compiling {species[number]}")
         flora = in_year(scene, compile_for((kind,), scene, data.depsgraph))
         share = max(1, round(most * counts[number] / of_species[species[number]]))
-        found.append(PlantKind(kind, flora, np.flatnonzero(seeds.species == number), share))
-    return found
+        kinds.append(PlantKind(kind, flora, np.flatnonzero(seeds.species == number), share))
+    return kinds
 
 
 def variants_of(
@@ -93,29 +93,29 @@ def variants_of(
         They would not fit; the message says what to lower.
     """
     variant, scale, faces = np.zeros(len(seeds), np.int32), np.ones(len(seeds)), np.zeros(2)
-    made: list[tuple[str, tuple[PlantLevel, ...], float, PlantKind]] = []
+    drafts: list[tuple[str, tuple[PlantLevel, ...], float, PlantKind]] = []
     for number, kind in enumerate(kinds):
         progress = Progress(number / len(kinds), f"variants of {kind.species.name}")
         yield progress
-        own = replace(seeds.take(kind.plants), identifiers=(kind.name,), species=np.zeros(len(kind.plants), np.int32))
-        chosen = yield from call_in_thread(progress, choose_variants, kind.flora, own, kind.variants)
-        variant[kind.plants], scale[kind.plants] = len(made) + chosen.variant, chosen.scale
+        alike = replace(seeds.take(kind.plants), identifiers=(kind.name,), species=np.zeros(len(kind.plants), np.int32))
+        chosen = yield from call_in_thread(progress, choose_variants, kind.flora, alike, kind.variants)
+        variant[kind.plants], scale[kind.plants] = len(drafts) + chosen.variant, chosen.scale
         like: tuple[PlantLevel, ...] = ()
         for count, plant in enumerate(chosen.plants.tolist()):
             share = (number + count / len(chosen.plants)) / len(kinds)
             progress = Progress(share, f"{kind.species.name}, variant {count + 1} of {len(chosen.plants)}")
-            one = own.take(slice(plant, plant + 1))
+            one = alike.take(slice(plant, plant + 1))
             like = yield from call_in_thread(progress, levels_of, kind.flora, one, number_of_levels, like)
             small = tuple(level for level in like if level.polygons <= most_polygons) if most_polygons else like
             high = max(float(mesh.positions[:, 2].max()) for _, mesh in like[0].parts)
-            made.append((f"{species_of(kind.name)}_{count + 1}", small or like[-1:], high, kind))
-            more = _faces(made[-1][1])  # and as many for each of those to come
+            drafts.append((f"{species_of(kind.name)}_{count + 1}", small or like[-1:], high, kind))
+            more = _faces(drafts[-1][1])  # and as many for each of those to come
             expected = faces + more * (len(chosen.plants) - count)
             check_fits(f"Variants of {kind.species.name}", expected, left, "or lower Variants or Max Polygons")
             faces += more
     variants = [
         Variant(name, kind.species.identifier, levels, height, {})
-        for name, (_, levels, height, kind) in zip(identifiers([name for name, *_ in made]), made, strict=True)
+        for name, (_, levels, height, kind) in zip(identifiers([name for name, *_ in drafts]), drafts, strict=True)
     ]
     return Shown(tuple(variants), variant, scale)
 
@@ -129,13 +129,13 @@ def _faces(levels: Sequence[PlantLevel]) -> Floats:
 
 def forest_parts(data: JobData, sources: Sequence[Source], shown: Shown) -> Job[tuple[ForestPart, ...]]:
     """Plants of each object as they are written."""
-    made, first = [], 0
+    parts, first = [], 0
     for number, source in enumerate(sources):
         yield Progress(number / len(sources), f'plants of "{source.part[0]}"')
-        some = slice(first, first + len(source.part[1]))
-        made.append(_forest_part(data.depsgraph, source, shown.variant[some], shown.scale[some], shown))
-        first = some.stop
-    return tuple(made)
+        span = slice(first, first + len(source.part[1]))
+        parts.append(_forest_part(data.depsgraph, source, shown.variant[span], shown.scale[span], shown))
+        first = span.stop
+    return tuple(parts)
 
 
 def _forest_part(depsgraph: Depsgraph, source: Source, variant: Integers32, scale: Floats, shown: Shown) -> ForestPart:
@@ -173,17 +173,17 @@ def _settings(field: Object, matrix: Floats) -> dict[str, float | int | str | li
 
     Blender cannot find that again from a matrix without an error in the last digit.
     """
-    found = {"age": field.tetflora.age, "seed": field.tetflora.seed}
+    settings = {"age": field.tetflora.age, "seed": field.tetflora.seed}
     if not np.array_equal(np.array(field.matrix_basis), matrix):  # it has a parent or constraints
-        return found
+        return settings
     mode = field.rotation_mode
     name = {'QUATERNION': "rotation_quaternion", 'AXIS_ANGLE': "rotation_axis_angle"}.get(mode, "rotation_euler")
-    return found | {"rotation_mode": mode} | {key: list(getattr(field, key)) for key in ("location", name, "scale")}
+    return settings | {"rotation_mode": mode} | {key: list(getattr(field, key)) for key in ("location", name, "scale")}
 
 
 def _points(place: Floats, rotation: Floats, seeds: Seeds, ages: Floats | None, sizes: Sizes | None) -> PointAttributes:
     """Attributes of a field with some plants, in single precision."""
-    found = {
+    attributes = {
         "position": ('FLOAT_VECTOR', place),
         "rotation": ('QUATERNION', rotation),
         "scale": ('FLOAT', seeds.scale.astype(np.float32)),
@@ -191,13 +191,13 @@ def _points(place: Floats, rotation: Floats, seeds: Seeds, ages: Floats | None, 
         "seed": stored_seeds(seeds.seed),
     }
     if ages is not None:
-        found[AGE] = 'FLOAT', ages.astype(np.float32)
+        attributes[AGE] = 'FLOAT', ages.astype(np.float32)
     if sizes is not None:
         columns = (sizes.height, sizes.diameter, sizes.width, sizes.base, sizes.dead)
-        found |= {key: ('FLOAT', of.astype(np.float32)) for key, of in zip(NUMBERS, columns, strict=True)}
+        attributes |= {key: ('FLOAT', of.astype(np.float32)) for key, of in zip(NUMBERS, columns, strict=True)}
         for key, of in ((OFFSET, sizes.offset), (FIT, sizes.fit)):
-            found[key] = 'FLOAT_VECTOR', np.pad(of, ((0, 0), (0, 1))).astype(np.float32)
-    return found
+            attributes[key] = 'FLOAT_VECTOR', np.pad(of, ((0, 0), (0, 1))).astype(np.float32)
+    return attributes
 
 
 #: Most variants of a species, and levels of detail of one.

@@ -57,8 +57,8 @@ class _Look:
 
     def mean(self, attribute: str) -> float:
         """Mean of an attribute of faces; 0 where there is none."""
-        found = self.meshes[0].attributes.get(attribute)
-        return 0.0 if found is None else float(found[1].mean(dtype=np.float64))
+        stored = self.meshes[0].attributes.get(attribute)
+        return 0.0 if stored is None else float(stored[1].mean(dtype=np.float64))
 
 
 def with_surfaces(
@@ -78,32 +78,32 @@ def with_surfaces(
     with _forgotten():
         variants = list(_even(_on_trunks(scene, variants) if bake else variants))
     looks = _looks(variants)
-    found: dict[tuple[str, str], BakedSurface] = {}
+    by_part: dict[tuple[str, str], BakedSurface] = {}
     for number, look in enumerate(looks):
         yield Progress(number / max(len(looks), 1), f"texture of {look.name}")
-        found[look.species, look.part] = _surface(scene, look, folder, textures, bake)
+        by_part[look.species, look.part] = _surface(scene, look, folder, textures, bake)
     palettes = {(look.species, look.part): look.palette for look in looks}
-    made = []
+    textured = []
     for variant in variants:
-        own = {part: palette for (species, part), palette in palettes.items() if species == variant.species}
-        levels = tuple(in_atlas(level, own) for level in variant.levels)
-        surfaces = {part: found[variant.species, part] for part in own}
+        atlases = {part: palette for (species, part), palette in palettes.items() if species == variant.species}
+        levels = tuple(in_atlas(level, atlases) for level in variant.levels)
+        surfaces = {part: by_part[variant.species, part] for part in atlases}
         for part, surface in list(surfaces.items()):
             if surface.cut:
                 levels = tuple(_uncut(level, part, surface.kept) for level in levels)
                 opaque = {name: file for name, file in surface.textures.items() if name not in ("opacity", "card")}
                 far = replace(surface, name=surface.name + _FAR, cut=0.0, problems=(), textures=opaque)
                 surfaces[part + _FAR] = far
-        made.append(replace(variant, levels=levels, surfaces=surfaces))
-    return tuple(made)
+        textured.append(replace(variant, levels=levels, surfaces=surfaces))
+    return tuple(textured)
 
 
 def _uncut(level: PlantLevel, part: str, kept: float) -> PlantLevel:
     """A coarse level with leaves that are not cut: smaller, as textures show the mean of a leaf where it is shown."""
     if level.pixel == 0.0:
         return level
-    made = ((kind + _FAR, with_area(mesh, kept)) if kind == part else (kind, mesh) for kind, mesh in level.parts)
-    return replace(level, parts=tuple(made))
+    parts = ((kind + _FAR, with_area(mesh, kept)) if kind == part else (kind, mesh) for kind, mesh in level.parts)
+    return replace(level, parts=tuple(parts))
 
 
 def _even(variants: Sequence[Variant]) -> Iterator[Variant]:
@@ -117,16 +117,16 @@ def _even(variants: Sequence[Variant]) -> Iterator[Variant]:
 
 def _on_trunks(scene: bpy.types.Scene, variants: Sequence[Variant]) -> Iterator[Variant]:
     """Variants whose trunks have the mean colors of their bark by height: textures have one mean for all wood."""
-    found: dict[str, Floats] = {}
+    colors: dict[str, Floats] = {}
     for variant in variants:
         girth = max((m.attributes["tf_girth"][1].max() for k, m in variant.levels[0].parts if k == "bark"), default=0.0)
         material = materials_of(scene, species_for(scene, variant.species), "bark", 0)[0]
-        if variant.species not in found and girth and is_ours(material):
+        if variant.species not in colors and girth and is_ours(material):
             tone, ends = np.full(3, 0.2), (np.zeros(2), np.array([1.0, _ABOVE + 1.0]))
             texels = _baked(material, tone, 0.0, TEXELS, *ends, float(girth), {"color": PASSES["color"]})["color"]
-            found[variant.species] = texels.mean(axis=(1, 2), dtype=np.float64) / tone[0]
-        if variant.species in found:
-            rows, levels = found[variant.species], []
+            colors[variant.species] = texels.mean(axis=(1, 2), dtype=np.float64) / tone[0]
+        if variant.species in colors:
+            rows, levels = colors[variant.species], []
             for level in variant.levels:
                 parts = ((k, _by_height(m, rows, girth) if k == "bark" else m) for k, m in level.parts)
                 levels.append(replace(level, parts=tuple(parts)))
@@ -182,30 +182,30 @@ def _surface(scene: bpy.types.Scene, look: _Look, folder: Path, textures: str, b
     shown = np.ones((TEXELS, TEXELS), bool)
     if not is_bark:
         shown = np.any([outline(look.palette, mesh) for mesh in look.meshes], axis=0)
-    own = None if is_ours(material) else _own_of(material, look)
-    cut, kept = 0.0, 1.0 if own is None or is_bark else float(own.cover[shown].mean())
+    read = None if is_ours(material) else _own_of(material, look)
+    cut, kept = 0.0, 1.0 if read is None or is_bark else float(read.cover[shown].mean())
     if kept < _WHOLE:
-        solid = shown & (own.cover >= 0.5)
+        solid = shown & (read.cover >= 0.5)
         if solid.any():
             # Textures from afar have its mean, of which nothing must vanish.
-            cut, shown, problems, images = min(0.5, kept / 2.0), solid, problems + own.problems, _filled(images, own)
+            cut, shown, problems, images = min(0.5, kept / 2.0), solid, problems + read.problems, _filled(images, read)
         else:
             problems.append(f'Material "{material.name}" is transparent everywhere; its leaves are opaque in the file')
     if images:
-        if is_bark or own is not None:
+        if is_bark or read is not None:
             rough = float(images["roughness"][shown].mean())
-        gloss = gloss if own is None else 1.0  # at most, by an index of 1.5, as Blender's own materials
+        gloss = gloss if read is None else 1.0  # at most, by an index of 1.5, as Blender's own materials
         if np.ptp(images["roughness"]) < _EVEN:  # as of TetFlora's own materials
             del images["roughness"]
         if images["normal"][..., :2].std() < _EVEN:
             del images["normal"]
     if not is_bark:
         # Not as alpha of colors, which EEVEE multiplies by it: outlines are for cards, and polygons need none.
-        images["opacity"] = (own.cover if cut else shown)[..., None].astype(np.float32)
+        images["opacity"] = (read.cover if cut else shown)[..., None].astype(np.float32)
     palette, color = look.palette, look.color
     detail = images.get("color", np.ones((TEXELS, TEXELS, 3), np.float32))
-    if own is not None and own.color is not None:
-        detail = detail / (1.0 - own.through) if "color" in images else detail * own.color
+    if read is not None and read.color is not None:
+        detail = detail / (1.0 - read.through) if "color" in images else detail * read.color
         palette, color = replace(palette, colors=np.ones_like(palette.colors)), detail[shown].mean(axis=0)
     else:
         detail = detail / np.maximum(detail[shown].mean(axis=0), 1e-6)
@@ -225,13 +225,13 @@ def _material_of(scene: bpy.types.Scene, look: _Look) -> tuple[bpy.types.Materia
     species = species_for(scene, look.species)
     forms = 1 if look.part == "bark" else len(species.forms(look.part))
     every = [m for form in range(forms) for m in materials_of(scene, species, look.part, form) if m is not None]
-    found = every[0]
+    material = every[0]
     problems = []
-    if any(other != found for other in every):
-        problems.append(f'{look.name} has several materials; "{found.name}" stands for all')
-    if tree_in_use(found) is None:
-        problems.append(f'Material "{found.name}" has no nodes, and its viewport color stands in; turn on Use Nodes')
-    return found, problems
+    if any(other != material for other in every):
+        problems.append(f'{look.name} has several materials; "{material.name}" stands for all')
+    if tree_in_use(material) is None:
+        problems.append(f'Material "{material.name}" has no nodes, and its viewport color stands in; turn on Use Nodes')
+    return material, problems
 
 
 def _details(material: bpy.types.Material, look: _Look) -> dict[str, Floats32]:
@@ -244,7 +244,7 @@ def _details(material: bpy.types.Material, look: _Look) -> dict[str, Floats32]:
         flat, long = (np.linalg.norm(of[:, 1] - of[:, 0], axis=1).sum() for of in (uv, place))
         meters = float(long / max(flat, 1e-9))
     images = _baked(material, look.color, look.mean("tf_transmission"), TEXELS, low, look.palette.size, meters)
-    return {name: tiled(own) if is_bark else within(own) for name, own in images.items()}
+    return {name: tiled(texels) if is_bark else within(texels) for name, texels in images.items()}
 
 
 @dataclass(frozen=True)
@@ -257,13 +257,13 @@ class _Own:
     problems: list[str]
 
 
-def _filled(images: dict[str, Floats32], own: _Own) -> dict[str, Floats32]:
+def _filled(images: dict[str, Floats32], read: _Own) -> dict[str, Floats32]:
     """The same without what is baked of transparent texels: black, and colors times the part that is not."""
-    solid, found = own.cover >= 0.5, {}
+    solid, filled = read.cover >= 0.5, {}
     for name, texels in images.items():
-        texels = texels / np.maximum(own.cover, 0.5)[..., None] if PASSES[name][1] else texels
-        found[name] = np.where(solid[..., None], texels, texels[solid].mean(axis=0))
-    return found
+        texels = texels / np.maximum(read.cover, 0.5)[..., None] if PASSES[name][1] else texels
+        filled[name] = np.where(solid[..., None], texels, texels[solid].mean(axis=0))
+    return filled
 
 
 def _own_of(material: bpy.types.Material, look: _Look) -> _Own:
@@ -315,7 +315,7 @@ def _baked(
     They are those of faces of a linear color (3,) and a transmission, over a square of texture coordinates from ``low``
     on (2,), with so many meters to a unit of these.
     """
-    found: dict[str, Floats32] = {}
+    images: dict[str, Floats32] = {}
     copy = material.copy()  # those of other files cannot be changed
     try:
         node = copy.node_tree.nodes.active = copy.node_tree.nodes.new("ShaderNodeTexImage")
@@ -326,12 +326,12 @@ def _baked(
                 try:
                     with bpy.context.temp_override(**given, selected_objects=[obj], selected_editable_objects=[obj]):
                         bpy.ops.object.bake(type=kind, pass_filter={'COLOR'} if is_color else set(), margin=0)
-                    found[name] = image_pixels(node.image)[..., :3].copy()
+                    images[name] = image_pixels(node.image)[..., :3].copy()
                 finally:
                     bpy.data.images.remove(node.image)
     finally:
         bpy.data.materials.remove(copy)
-    return found
+    return images
 
 
 @contextmanager

@@ -51,9 +51,9 @@ def library() -> SimpleNamespace:
     TetFloraError
         This Blender has none.
     """
-    if (found := usd()) is None:
+    if (modules := usd()) is None:
         raise TetFloraError("This Blender was built without USD; choose glTF or OBJ, or use another build")
-    return found
+    return modules
 
 
 def write_usd(path: Path, forest: Forest) -> Iterator[float]:
@@ -118,8 +118,8 @@ def _write_part(pxr: SimpleNamespace, stage: object, path: str, part: ForestPart
     known = {"position": ('FLOAT_VECTOR', part.position), **{name: columns[name] for name in ("seed", "species")}}
     stored: dict[str, str] = {}
     for name, (kind, values) in part.points.items():
-        there, one = known.get(name, ("", values))
-        same = (there, one.shape) == (kind, values.shape) and one.tobytes() == values.astype(one.dtype).tobytes()
+        known_kind, one = known.get(name, ("", values))
+        same = (known_kind, one.shape) == (kind, values.shape) and one.tobytes() == values.astype(one.dtype).tobytes()
         stored[name] = kind if same else f"{kind} {PREFIX}{name}"
         if not same:
             _add(pxr, primvars, PREFIX + name, kind, values)
@@ -173,22 +173,22 @@ def _write_level(pxr: SimpleNamespace, stage: object, path: str, level: PlantLev
     """One mesh, of which kinds of parts are subsets: Unreal knows levels that are one each."""
     meshes = [mesh for _, mesh in level.parts]
     mesh = concatenate_buffers(meshes)
-    made = pxr.UsdGeom.Mesh.Define(stage, path)
-    made.CreateSubdivisionSchemeAttr(pxr.UsdGeom.Tokens.none)
-    made.CreatePointsAttr(_array(pxr, "Vec3f", mesh.positions))
-    made.CreateFaceVertexCountsAttr(_array(pxr, "Int", np.diff(mesh.face_offsets).astype(np.int32)))
-    made.CreateFaceVertexIndicesAttr(_array(pxr, "Int", mesh.corner_verts))
-    made.CreateDoubleSidedAttr(True)
+    prim = pxr.UsdGeom.Mesh.Define(stage, path)
+    prim.CreateSubdivisionSchemeAttr(pxr.UsdGeom.Tokens.none)
+    prim.CreatePointsAttr(_array(pxr, "Vec3f", mesh.positions))
+    prim.CreateFaceVertexCountsAttr(_array(pxr, "Int", np.diff(mesh.face_offsets).astype(np.int32)))
+    prim.CreateFaceVertexIndicesAttr(_array(pxr, "Int", mesh.corner_verts))
+    prim.CreateDoubleSidedAttr(True)
     ends = np.stack([mesh.positions.min(axis=0), mesh.positions.max(axis=0)])
-    made.CreateExtentAttr(_array(pxr, "Vec3f", ends))
-    made.CreateNormalsAttr(_array(pxr, "Vec3f", np.concatenate([corner_normals(one) for one in meshes])))
-    made.SetNormalsInterpolation(pxr.UsdGeom.Tokens.faceVarying)
-    primvars, types, tokens = pxr.UsdGeom.PrimvarsAPI(made), pxr.Sdf.ValueTypeNames, pxr.UsdGeom.Tokens
+    prim.CreateExtentAttr(_array(pxr, "Vec3f", ends))
+    prim.CreateNormalsAttr(_array(pxr, "Vec3f", np.concatenate([corner_normals(one) for one in meshes])))
+    prim.SetNormalsInterpolation(pxr.UsdGeom.Tokens.faceVarying)
+    primvars, types, tokens = pxr.UsdGeom.PrimvarsAPI(prim), pxr.Sdf.ValueTypeNames, pxr.UsdGeom.Tokens
     uv, color = (mesh.attributes[name][1] for name in ("UVMap", "tf_color"))
     _add_indexed(pxr, primvars.CreatePrimvar("st", types.TexCoord2fArray, tokens.faceVarying), "Vec2f", uv)
     color = np.rint(color * _TONES) / np.float32(_TONES)
     _add_indexed(pxr, primvars.CreatePrimvar("displayColor", types.Color3fArray, tokens.uniform), "Vec3f", color)
-    binding, first = pxr.UsdShade.MaterialBindingAPI.Apply(made.GetPrim()), 0
+    binding, first = pxr.UsdShade.MaterialBindingAPI.Apply(prim.GetPrim()), 0
     for kind, one in level.parts:
         faces = np.arange(first, first + one.polygons, dtype=np.int32)
         subset = binding.CreateMaterialBindSubset(kind, _array(pxr, "Int", faces)).GetPrim()
@@ -278,13 +278,13 @@ def _read_parts(path: Path) -> Iterator[tuple[str, dict, PointAttributes]]:
 
 
 def _own_points(pxr: SimpleNamespace, prim: object, data: dict) -> PointAttributes:
-    primvars, found = pxr.UsdGeom.PrimvarsAPI(prim), {}
+    primvars, attributes = pxr.UsdGeom.PrimvarsAPI(prim), {}
     for name, told in dict(data["attributes"]).items():
         kind, _, other = str(told).partition(" ")
         place = name == "position" and not other
         values = np.array((prim.GetAttribute("positions") if place else primvars.GetPrimvar(other or name)).Get())
-        found[name] = kind, np.ascontiguousarray(np.roll(values, 1, axis=1)) if kind == 'QUATERNION' else values
-    return found
+        attributes[name] = kind, np.ascontiguousarray(np.roll(values, 1, axis=1)) if kind == 'QUATERNION' else values
+    return attributes
 
 
 def _other_points(pxr: SimpleNamespace, prim: object) -> PointAttributes:
@@ -297,17 +297,17 @@ def _other_points(pxr: SimpleNamespace, prim: object) -> PointAttributes:
     world = world * np.array([pxr.UsdGeom.GetStageMetersPerUnit(prim.GetStage())] * 3 + [1.0])[:, None]
     if up == pxr.UsdGeom.Tokens.y:
         world = np.array([[1, 0, 0, 0], [0, 0, -1, 0], [0, 1, 0, 0], [0, 0, 0, 1.0]]) @ world
-    found = {"position": ('FLOAT_VECTOR', (places @ world[:3, :3].T + world[:3, 3]).astype(np.float32))}
+    attributes = {"position": ('FLOAT_VECTOR', (places @ world[:3, :3].T + world[:3, 3]).astype(np.float32))}
     primvars = pxr.UsdGeom.PrimvarsAPI(prim)
     for name, kind in (("seed", 'INT'), ("species", 'INT'), ("age", 'FLOAT'), ("scale", 'FLOAT')):
         values = primvars.GetPrimvar(name).Get(time) if primvars.HasPrimvar(name) else None
         values = None if values is None else np.asarray(values)
         if values is not None and values.shape == (number,) and values.dtype.kind in "iuf":
-            found[name] = kind, values.astype(np.int32 if kind == 'INT' else np.float32)
+            attributes[name] = kind, values.astype(np.int32 if kind == 'INT' else np.float32)
     scales = np.array(prim.GetAttribute("scales").Get(time) or []) if is_instancer else np.zeros(0)
-    if "scale" not in found and scales.shape == (number, 3):
-        found["scale"] = 'FLOAT', scales.mean(axis=1).astype(np.float32)
-    return found
+    if "scale" not in attributes and scales.shape == (number, 3):
+        attributes["scale"] = 'FLOAT', scales.mean(axis=1).astype(np.float32)
+    return attributes
 
 
 _SPECIES, _SEED = 1, 2
@@ -329,7 +329,7 @@ def forest_steps(order: Import, mix: Mapping[str, float]) -> Steps:
         The file holds no points, or is of a newer TetFlora.
     """
     yield Progress(0.0, f"Reading {order.path.name}")
-    made: list[bpy.types.Object] = []
+    fields: list[bpy.types.Object] = []
     whole, missing, number = False, [], 0
     try:
         for name, data, points in _read_parts(order.path):
@@ -339,35 +339,35 @@ def forest_steps(order: Import, mix: Mapping[str, float]) -> Steps:
                 kinds = list(zip(map(str, data["species"]), map(str, data["forms"]), strict=True))
             else:
                 points, kinds = _completed(points, mix)
-            made.append(_field(name, data, points, kinds))
+            fields.append(_field(name, data, points, kinds))
             missing += [form for _, form in kinds if form and bpy.data.objects.get(form) is None]
             number += len(points["position"][1])
             yield Progress(0.5, f"{number:,} plants")
-        for field in made:
+        for field in fields:
             link_field(order.scene, field)
         whole = True
     finally:
         if not whole:
-            meshes = [field.data for field in made]
-            bpy.data.batch_remove(made)
+            meshes = [field.data for field in fields]
+            bpy.data.batch_remove(fields)
             bpy.data.batch_remove(meshes)
-    told = [f"{number:,} plants imported", f"{len(made):,} field{'s' * (len(made) > 1)}"]
+    told = [f"{number:,} plants imported", f"{len(fields):,} field{'s' * (len(fields) > 1)}"]
     if missing:
         told.append(f"without their forms, which this file has no objects for: {listed(sorted(set(missing)))}")
-    return Imported(made[0], told, bool(missing))
+    return Imported(fields[0], told, bool(missing))
 
 
 def _completed(points: PointAttributes, mix: Mapping[str, float]) -> tuple[PointAttributes, list[tuple[str, str]]]:
     """Points of another program with seeds and species, by chance where they tell none."""
     number, names = len(points["position"][1]), list(mix)
     keys = child_key(key_of_seed(0), np.arange(number))
-    found = dict(points)
-    if "seed" not in found:
-        found["seed"] = 'INT', (uniform(keys, _SEED) * 2**31).astype(np.int32)
-    known = found.get("species")
+    attributes = dict(points)
+    if "seed" not in attributes:
+        attributes["seed"] = 'INT', (uniform(keys, _SEED) * 2**31).astype(np.int32)
+    known = attributes.get("species")
     if known is None or not ((known[1] >= 0) & (known[1] < len(names))).all():
-        found["species"] = 'INT', species_by_weight(tuple(mix.values()), uniform(keys, _SPECIES)).astype(np.int32)
-    return found, [(name, "") for name in names]
+        attributes["species"] = 'INT', species_by_weight(tuple(mix.values()), uniform(keys, _SPECIES)).astype(np.int32)
+    return attributes, [(name, "") for name in names]
 
 
 def _field(name: str, data: Mapping, points: PointAttributes, kinds: list[tuple[str, str]]) -> bpy.types.Object:

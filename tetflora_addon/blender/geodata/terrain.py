@@ -111,13 +111,13 @@ def _png(path: Path) -> Raster:
     checked_size(width, height, f"{path.name}: ")
     if colors not in (0, 2) or bits not in (8, 16):
         raise SceneError(f"{path.name}: chunk IHDR: it must be gray, of 16 bits, without a palette and alpha")
-    at, name = 8, b""
+    byte, name = 8, b""
     while name != b"IEND":  # Blender would make flat ground of what is damaged
-        size, name = struct.unpack(">I4s", content[at : at + 8].ljust(8, b"\0"))
-        end = at + 12 + size
-        if end > len(content) or zlib.crc32(content[at + 4 : end - 4]) != int.from_bytes(content[end - 4 : end]):
-            raise SceneError(f"{path.name}: byte {at:,}: it is damaged or was not copied whole")
-        at = end
+        size, name = struct.unpack(">I4s", content[byte : byte + 8].ljust(8, b"\0"))
+        end = byte + 12 + size
+        if end > len(content) or zlib.crc32(content[byte + 4 : end - 4]) != int.from_bytes(content[end - 4 : end]):
+            raise SceneError(f"{path.name}: byte {byte:,}: it is damaged or was not copied whole")
+        byte = end
     image = _loaded(path, "Blender cannot read its pixels; it is damaged")
     try:
         image.colorspace_settings.name = "Non-Color"
@@ -167,13 +167,13 @@ def terrain_steps(order: Import, most: int, image: Path | None = None) -> Steps:
         cells = photo.cells(between(coarse.places(column, row)[used], coarse.system, photo.system)) + 0.5
         material, uv, beside = _photo_material(image, cells)
         notes += [f"{beside:,} of {len(uv):,} vertices lie beside the image"] * (beside > 0)
-    made = _mesh(order.path.stem, points[used], number[faces], uv, material)
-    order.scene.collection.objects.link(made)
+    obj = _mesh(order.path.stem, points[used], number[faces], uv, material)
+    order.scene.collection.objects.link(obj)
     order.remember(place)
     step = float(np.linalg.norm(points[faces[:, 0], :2] - points[faces[:, 1], :2], axis=1).mean())
     finer = "; the file is finer, see Max Faces" * (coarse is not raster)
-    ground = f'Ground "{made.name}" of {len(faces):,} faces, one every {step:.2f} m{finer}'
-    return Imported(made, [ground, *notes])
+    ground = f'Ground "{obj.name}" of {len(faces):,} faces, one every {step:.2f} m{finer}'
+    return Imported(obj, [ground, *notes])
 
 
 def _faces(raster: Raster) -> Integers:
@@ -238,11 +238,11 @@ def _mesh(name: str, points: NDArray, faces: NDArray, uv: NDArray, material: Mat
         colors, green = np.broadcast_to(_SOIL, (*shape, 3)), np.full(shape, _COVERED)
         material = soil_material(f"{name} soil", colors, green, np.array(_GREEN), low, high - low)
     mesh.materials.append(material)
-    made = bpy.data.objects.new(name, mesh)
-    made.location = middle
-    made[TERRAIN] = True
-    made.tetflora.is_occluder = True
-    return made
+    obj = bpy.data.objects.new(name, mesh)
+    obj.location = middle
+    obj[TERRAIN] = True
+    obj.tetflora.is_occluder = True
+    return obj
 
 
 def heights_steps(order: Import, progress: Progress) -> Job[HeightGrid | None]:
@@ -293,22 +293,22 @@ def outline_steps(order: Import, kind: str = "") -> Steps:
     rings = [[next(flat) for _ in outline.rings] for outline in outlines]
     heights = yield from heights_steps(order, Progress(0.4, "Reading the ground"))
     top = bpy.data.collections.new(order.path.stem)
-    made = [bpy.data.collections.new(kind) for kind in KINDS]
+    collections = [bpy.data.collections.new(kind) for kind in KINDS]
     try:
-        for number, (outline, own) in enumerate(zip(outlines, rings, strict=True)):
+        for number, (outline, local) in enumerate(zip(outlines, rings, strict=True)):
             if number % _BATCH == 0:
                 yield Progress(0.5 + 0.5 * number / len(outlines), "Drawing outlines")
-            made[KINDS.index(outline.kind)].objects.link(_curve(outline, own, heights))
+            collections[KINDS.index(outline.kind)].objects.link(_curve(outline, local, heights))
     except BaseException:  # an error, or Esc
-        _remove([top, *made])
+        _remove([top, *collections])
         raise
-    found = {kind: collection for kind, collection in zip(KINDS, made, strict=True) if collection.objects}
-    for collection in found.values():
+    filled = {kind: collection for kind, collection in zip(KINDS, collections, strict=True) if collection.objects}
+    for collection in filled.values():
         top.children.link(collection)
-    bpy.data.batch_remove([collection for collection in made if not collection.objects])
+    bpy.data.batch_remove([collection for collection in collections if not collection.objects])
     order.scene.collection.children.link(top)
     order.remember(place)
-    told = ", ".join(f"{kind} {len(collection.objects):,}" for kind, collection in found.items())
+    told = ", ".join(f"{kind} {len(collection.objects):,}" for kind, collection in filled.items())
     return Imported(None, [f"Outlines imported: {told}", *notes, f"coordinates: {system.name}"])
 
 

@@ -120,8 +120,8 @@ def curves_of(species: Species) -> Curves:
     width = height if ages.scaled else np.clip(diameter**ages.spread, 0.45 * height, 1.4 * height**0.8)
     rows = compile_species([species]).rows
     trunk = trunks(rows, Seeds.upright(_PLANTS))
-    at = np.minimum(_BREAST / trunk.length, 0.5)
-    full = float(2.0 * (trunk.radius * profile(rows, trunk.row, trunk.key, at)).mean())
+    breast = np.minimum(_BREAST / trunk.length, 0.5)
+    full = float(2.0 * (trunk.radius * profile(rows, trunk.row, trunk.key, breast)).mean())
     return Curves(crown.height * height, full * diameter, 2.0 * crown.radius * width)
 
 
@@ -134,21 +134,21 @@ def complete(
     """
     height = sizes["height"].copy()
     for number, identifier in enumerate(identifiers):
-        own = (kinds == number) & (height == 0.0)
+        lacking = (kinds == number) & (height == 0.0)
         for name in ("diameter", "width"):
             known = sizes["diameter" if name == "diameter" else "crown_width"]
-            some = np.flatnonzero(own & (known > 0.0) & (height == 0.0))
-            if not len(some):
+            trees = np.flatnonzero(lacking & (known > 0.0) & (height == 0.0))
+            if not len(trees):
                 continue
             try:
                 curves = curves_of(find(identifier))
             except SpeciesError:
                 break
             by = getattr(curves, name)
-            found = np.interp(np.log(known[some]), np.log(by), np.log(curves.height))
-            height[some] = np.exp(found) * np.minimum(np.clip(known[some] / by[-1], 1.0, None) ** 0.5, _TALLER)
+            log_height = np.interp(np.log(known[trees]), np.log(by), np.log(curves.height))
+            height[trees] = np.exp(log_height) * np.minimum(np.clip(known[trees] / by[-1], 1.0, None) ** 0.5, _TALLER)
             if name == "diameter":  # it is measured at that height
-                height[some] = np.maximum(height[some], _BREAST + np.minimum(_SLENDER * known[some], 1.0))
+                height[trees] = np.maximum(height[trees], _BREAST + np.minimum(_SLENDER * known[trees], 1.0))
     return height, int((height != sizes["height"]).sum())
 
 
@@ -193,19 +193,19 @@ def inventory_steps(
     kinds, sizes = kinds[kept], {name: values[kept] for name, values in inventory.sizes.items()}
     yield Progress(0.5, "Completing sizes")
     sizes["height"], completed = complete(sizes, kinds, identifiers, lambda name: species_for(order.scene, name))
-    made = yield from _plant(order, place, flat[kept], kinds, identifiers, sizes)
+    imported = yield from _plant(order, place, flat[kept], kinds, identifiers, sizes)
     left = " and left out" * (len(kept) < len(flat))
-    made.told[1:1] = [
+    imported.told[1:1] = [
         *[f"{others.total():,} of unknown species{left}: {name_counts(others, 25)}"] * bool(others),
         *[f"rows without a tree left out: {name_counts(inventory.left_out)}"] * bool(inventory.left_out),
         *[f"heights of {completed:,} follow from trunk or crown"] * bool(completed),
         *[f"{kin.total():,} stand as their nearest kin: {name_counts(kin)}"] * bool(kin),
     ]
-    made.told += [*inventory.notes, f"coordinates: {inventory.system.name}"]
+    imported.told += [*inventory.notes, f"coordinates: {inventory.system.name}"]
     if number := inventory.skipped:
-        made.told.append(f"{number:,} broken row{'s' * (number > 1)} skipped, the first: {inventory.first}")
-    made.warning = bool(others or number)
-    return made
+        imported.told.append(f"{number:,} broken row{'s' * (number > 1)} skipped, the first: {inventory.first}")
+    imported.warning = bool(others or number)
+    return imported
 
 
 def _species(inventory: Inventory, unknown: str) -> tuple[list[str], Integers32, Counter, Counter]:
@@ -270,23 +270,23 @@ def canopy_steps(order: Import, mix: Mapping[str, float], least: float, below: P
         notes += [f"{number:,} cells on buildings left out"] * (number > 0)
     if cell > _COARSEST:
         raise SceneError(f"{what}its cells are {cell:.1f} m wide; trees can be told apart up to {_COARSEST:g} m")
-    found = yield from steps_in_thread(find_trees(raster.values, cell, least), Progress(0.1, "Looking for treetops"))
-    number = len(found.height)
+    trees = yield from steps_in_thread(find_trees(raster.values, cell, least), Progress(0.1, "Looking for treetops"))
+    number = len(trees.height)
     if not number:
         raise SceneError(f"{what}nothing in it is {least:g} m high; check its unit, or lower Min Height")
-    flat = order.local(place, raster.places(found.column, found.row), raster.system)
+    flat = order.local(place, raster.places(trees.column, trees.row), raster.system)
     identifiers = list(mix)
     keys = child_key(child_key(key_of_seed(0), _SPECIES), np.arange(number))
     kinds = species_by_weight(tuple(mix.values()), uniform(keys, 0))
     unit = np.stack([along / np.linalg.norm(along), down / np.linalg.norm(down)])
     sizes = {
-        "height": found.height.astype(np.float32),
-        "crown_width": found.width.astype(np.float32),
-        "offset": np.column_stack([found.offset @ unit, np.zeros(number)]).astype(np.float32),
+        "height": trees.height.astype(np.float32),
+        "crown_width": trees.width.astype(np.float32),
+        "offset": np.column_stack([trees.offset @ unit, np.zeros(number)]).astype(np.float32),
     }
-    made = yield from _plant(order, place, flat, kinds, identifiers, sizes)
-    made.told += notes
-    return made
+    imported = yield from _plant(order, place, flat, kinds, identifiers, sizes)
+    imported.told += notes
+    return imported
 
 
 _COARSEST = 3.0  # meters
@@ -320,12 +320,12 @@ def _plant(
     if HEIGHT in columns:
         columns[FIT] = yield from _fit_steps(order.scene, placement, identifiers, columns)
     yield Progress(0.95, "Making the field")
-    made = add_field(order.scene, placement, identifiers, ages=ages)
-    made.name = made.data.name = order.path.stem
+    field = add_field(order.scene, placement, identifiers, ages=ages)
+    field.name = field.data.name = order.path.stem
     for name, values in columns.items():
-        write(made.data, name, values, data_type=SIZE_ATTRIBUTES[name])
+        write(field.data, name, values, data_type=SIZE_ATTRIBUTES[name])
     order.remember(place)
-    return Imported(made, parts)
+    return Imported(field, parts)
 
 
 def _fit_steps(
@@ -334,7 +334,7 @@ def _fit_steps(
     """Factors on height and crown width, (n, 3), that make up for what is random in each plant."""
     none, number = np.zeros((len(placement), 3)), len(placement)
     numbers = (columns.get(name, none[:, 0]).astype(np.float64) for name in NUMBERS)
-    own = Sizes(*numbers, columns.get(OFFSET, none)[:, :2], none[:, :2] + 1.0)
+    sizes = Sizes(*numbers, columns.get(OFFSET, none)[:, :2], none[:, :2] + 1.0)
     turn, frame = placement.azimuth, np.zeros((number, 3, 3))
     frame[:, 0, 0] = frame[:, 1, 1] = np.cos(turn)
     frame[:, 1, 0], frame[:, 0, 1], frame[:, 2, 2] = np.sin(turn), -np.sin(turn), 1.0
@@ -347,5 +347,5 @@ def _fit_steps(
         return species[name]
 
     progress = Progress(0.85, "Fitting plants to their sizes")
-    found = yield from call_in_thread(progress, fits_of, Seeds(tuple(identifiers), *given), own, find)
-    return np.pad(found, ((0, 0), (0, 1))).astype(np.float32)
+    fits = yield from call_in_thread(progress, fits_of, Seeds(tuple(identifiers), *given), sizes, find)
+    return np.pad(fits, ((0, 0), (0, 1))).astype(np.float32)

@@ -112,10 +112,10 @@ class SceneContents:
         names += [self.places[i].owner.name for i in np.searchsorted(ends, outliers.assets, side="right").tolist()]
         meshes = self.explicit.meshes if self.explicit is not None else None
         names += [meshes.surfaces[meshes.surface[i]].name for i in outliers.instances.tolist()]
-        found: dict[str, float] = {}
+        distances: dict[str, float] = {}
         for name, away in zip(names, outliers.away.tolist(), strict=True):
-            found[name] = min(away, found.get(name, np.inf))
-        return found
+            distances[name] = min(away, distances.get(name, np.inf))
+        return distances
 
     def polygons_full(self, flora: Flora) -> int:
         """Polygons of everything, expanded: expected ones of plants, and those of meshes."""
@@ -178,8 +178,8 @@ def load_for(
         return [load_species(min(list_species()))]
     # Each species is looked up once, of however many ages there are plants.
     plain = {kind: str(Kind.read(kind).plain) for kind in identifiers}
-    found = {kind: resolved_species(scene, kind, depsgraph) for kind in set(plain.values())}
-    return [kind_species(found[plain[kind]], kind, years) for kind in identifiers]
+    species = {kind: resolved_species(scene, kind, depsgraph) for kind in set(plain.values())}
+    return [kind_species(species[plain[kind]], kind, years) for kind in identifiers]
 
 
 def in_year(scene: bpy.types.Scene, flora: Flora) -> Flora:
@@ -267,9 +267,9 @@ def refinement_settings(scene: bpy.types.Scene) -> RefinementSettings:
 
 def use_machine(scene: bpy.types.Scene) -> None:
     """Let what follows work with as many threads, and processes with as much memory, as the artist wants."""
-    own = preferences()
+    prefs = preferences()
     fixed = scene.render.threads if scene.render.threads_mode == 'FIXED' else 0  # of all cores
-    parallel.set_threads(own.threads if own is not None and own.threads else fixed)
+    parallel.set_threads(prefs.threads if prefs is not None and prefs.threads else fixed)
     pool.set_memory_limit(memory.limit(most_memory(scene)))
 
 

@@ -93,20 +93,20 @@ def forecast_text(scene: Scene, view_layer: ViewLayer) -> str:
 
 
 def _text_for(scene: Scene, view_layer: ViewLayer) -> Generator[None, None, str]:
-    found = yield from forecast_steps(scene, view_layer)
-    if found is None:
+    cost = yield from forecast_steps(scene, view_layer)
+    if cost is None:
         # Plants are there, and their crowns are being looked for.
         return "" if _stand is not None or scene.camera is None else "Estimating…"
-    size = found.memory / _GIGA
-    taken = seconds_text(seconds_here(found)), polygons_text(found.primitives), f"{size:.{int(size < 10.0)}f} GB"
+    size = cost.memory / _GIGA
+    taken = seconds_text(seconds_here(cost)), polygons_text(cost.primitives), f"{size:.{int(size < 10.0)}f} GB"
     text = f"About {', '.join(taken)}"
-    return f"{text}\nLimited by {found.limit}" if found.limit else text
+    return f"{text}\nLimited by {cost.limit}" if cost.limit else text
 
 
 def memory_text(scene: Scene) -> str:
     """``Automatic: 11.7 GB`` where the artist sets no limit of memory, else that limit."""
-    if (own := most_memory(scene)) > 0.0:
-        return f"{own:.1f} GB by the preferences"
+    if (limit := most_memory(scene)) > 0.0:
+        return f"{limit:.1f} GB by the preferences"
     most = memory.limit(0.0)
     return f"Automatic: {most / _GIGA:.1f} GB" if np.isfinite(most) else "Automatic: no limit"
 
@@ -135,8 +135,8 @@ def _count(scene: Scene, view_layer: ViewLayer) -> Generator[None, None, Stand |
             if group.enabled:
                 single.append(obj)
         elif group.is_field:
-            if group.enabled and len(there := stored_now(obj)):
-                parts.append(_field(scene, obj, there))
+            if group.enabled and len(points := stored_now(obj)):
+                parts.append(_field(scene, obj, points))
         elif obj.instance_type == 'COLLECTION' and obj.instance_collection is not None:
             within = [o for o in objects_within(obj.instance_collection) if o.tetflora.is_plant]
             if within:
@@ -151,12 +151,12 @@ def _count(scene: Scene, view_layer: ViewLayer) -> Generator[None, None, Stand |
     rows = [(*sizes, np.array([index[kind] for kind in species], dtype=np.int64)) for *sizes, species in parts]
     left = [replace(c, parts=c.parts.with_leaves(_in_leaf(scene, identifier))) for identifier, c in crowns.items()]
     # Samples of all parts as one, of each by the root of its number: a few trees show more than much grass.
-    found: list[tuple] = [(np.zeros(0), np.zeros((0, 3)), np.zeros(0), np.zeros(0, np.int64))]
+    samples: list[tuple] = [(np.zeros(0), np.zeros((0, 3)), np.zeros(0), np.zeros(0, np.int64))]
     whole = sum(np.sqrt(number) for number, *_ in rows)
     for number, *values in rows:
         chosen = _some(len(values[0]), max(round(_LOOKED_AT * np.sqrt(number) / whole), 1))
-        found.append((np.full(len(chosen), number / len(chosen)), *(one[chosen] for one in values)))
-    return Stand(*map(np.concatenate, zip(*found, strict=True)), tuple(left))
+        samples.append((np.full(len(chosen), number / len(chosen)), *(one[chosen] for one in values)))
+    return Stand(*map(np.concatenate, zip(*samples, strict=True)), tuple(left))
 
 
 def _in_leaf(scene: Scene, kind: str) -> float:
@@ -194,26 +194,26 @@ def _aged(scene: Scene, scale: Floats, kinds: list[str], which: Integers, ages: 
     return scale * taller, [named[i] for i in which.tolist()]
 
 
-def _field(scene: Scene, obj: Object, there: Integers) -> tuple[int, Floats, Floats, list[str]]:
+def _field(scene: Scene, obj: Object, points: Integers) -> tuple[int, Floats, Floats, list[str]]:
     """The same of those points (n,) of a field that are plants now, as they are stored.
 
     What nodes make of it is not known before they are evaluated.
     """
     kinds = [species_of(kind) for kind in field_kinds(obj)]
-    number = len(there)
-    chosen = there[_some(number)]
+    number = len(points)
+    chosen = points[_some(number)]
     matrix = np.array(obj.matrix_world, dtype=np.float64)
     foot = read(obj.data, "position")[chosen].astype(np.float64) @ matrix[:3, :3].T + matrix[:3, 3]
     scale, species, tall = (stored(obj.data, name, chosen) for name in ("scale", "species", HEIGHT))
-    own = np.cbrt(abs(np.linalg.det(matrix[:3, :3])))
-    scale = own * (np.ones(len(chosen)) if scale is None else scale)
+    factor = np.cbrt(abs(np.linalg.det(matrix[:3, :3])))
+    scale = factor * (np.ones(len(chosen)) if scale is None else scale)
     which = np.zeros(len(chosen), np.int64) if species is None else np.clip(species, 0, len(kinds) - 1).astype(np.int64)
     ages = next((a for n in (PREFIX + AGE, AGE) if (a := stored(obj.data, n, chosen)) is not None), None)
     ages = np.full(len(chosen), obj.tetflora.age) if ages is None else ages
     if tall is not None:
         known = np.isfinite(tall) & (tall > 0.0)
         ages = np.where(known, _ages_of(scene, kinds, which, tall), ages)
-        scale = np.where(known, own, scale)
+        scale = np.where(known, factor, scale)
     scale, species = _aged(scene, scale, kinds, which, ages)
     wide = stored(obj.data, "tf_crown_width", chosen)
     if tall is not None and wide is not None:
@@ -233,11 +233,11 @@ def _ages_of(scene: Scene, kinds: list[str], which: Integers, tall: NDArray[np.f
     """Ages (n,) at which plants of some kinds are so tall, about."""
     out = np.zeros(len(tall))
     for number, kind in enumerate(kinds):
-        own = which == number
+        of_kind = which == number
         with suppress(SpeciesError):
             crown = crown_to_draw(scene, kind)
             full = display_height(kind) if crown is None else crown.height
-            out[own] = ages_of_heights(species_for(scene, kind), tall[own] / full)
+            out[of_kind] = ages_of_heights(species_for(scene, kind), tall[of_kind] / full)
     return out
 
 

@@ -143,7 +143,7 @@ def _around(scene: Scene, depsgraph: Depsgraph, given: SceneContents) -> Around:
     # Lengths are in meters for trunks, and in those of their parents for all others.
     grown = [kind_species(species_for(scene, species_of(kind)), kind, years_of(scene)) for kind in seeds.identifiers]
     orders = [species.orders for species in grown]
-    heights = np.array([np.cumprod([order.length.mean for order in own]).sum() for own in orders])
+    heights = np.array([np.cumprod([order.length.mean for order in generations]).sum() for generations in orders])
     centers, radii = [seeds.position], [heights[seeds.species] * seeds.scale * farthest(seeds.crown)]
     if meshes is not None:
         reach = [np.linalg.norm(surface.positions, axis=1).max() for surface in meshes.surfaces]
@@ -171,12 +171,14 @@ def camera_moves(scene: Scene) -> bool:
     return False
 
 
-def key_of(scene: Scene, depsgraph: Depsgraph, layers: Sequence[ViewLayer], camera: Camera, own: SceneContents) -> str:
+def key_of(
+    scene: Scene, depsgraph: Depsgraph, layers: Sequence[ViewLayer], camera: Camera, contents: SceneContents
+) -> str:
     """Digest of all that results for view layers depend on, with their camera and contents.
 
     Errors are those of `scene_digest`.
     """
-    content = hashlib.sha256(scene_digest(scene, depsgraph, camera, own).encode())
+    content = hashlib.sha256(scene_digest(scene, depsgraph, camera, contents).encode())
     add_to_digest(content, [scene.name, *(layer.name for layer in layers)])
     for group in (scene.tetflora, scene.tetflora.output, *scene.tetflora.output.species):
         add_to_digest(content, _values(group))
@@ -185,14 +187,14 @@ def key_of(scene: Scene, depsgraph: Depsgraph, layers: Sequence[ViewLayer], came
 
 def _values(group: PropertyGroup) -> list[object]:
     """Values of a scene's settings, except groups: `scene_digest` has those that matter."""
-    found: list[object] = []
+    values: list[object] = []
     for prop in group.bl_rna.properties:
         name = prop.identifier
         shows_others = prop.type == 'ENUM' and prop.is_enum_flag
         if name not in _IGNORED and prop.type not in {'POINTER', 'COLLECTION'} and not shows_others:
             value = getattr(group, name)
-            found.append((name, list(value) if getattr(prop, "is_array", False) else value))
-    return found
+            values.append((name, list(value) if getattr(prop, "is_array", False) else value))
+    return values
 
 
 def stow(scene: Scene, wanted: Collection[str]) -> None:
@@ -233,8 +235,8 @@ def store(scene: Scene, key: str, collection: bpy.types.Collection, camera: Came
     _entries[key] = _Entry(scene.session_uid, collection.name, originals, scene.tetflora.statistics)
     wind = wind_of(scene)
     # In a wind without a loop no frame returns.
-    own = preferences()
-    kept = own.kept_memory if own is not None else 1.0
+    prefs = preferences()
+    kept = prefs.kept_memory if prefs is not None else 1.0
     limit = kept * 1e3 if wind is None or wind.loop > 0.0 else 0.0
     left = memory_left(scene, camera) / 1e6 - _RENDERED * collection.get(MEGABYTES, 0.0)
     limit = min(limit, megabytes_held('RENDER') + left)
@@ -266,8 +268,8 @@ def reset() -> None:
 def _stowed(scene: Scene) -> list[str]:
     """Digests of a scene's results that are not in it, least recently used first."""
     shown = {c.name for c in result_collections(scene, 'RENDER')}
-    own = [key for key, entry in _entries.items() if entry.scene == scene.session_uid]
-    return [key for key in own if _entries[key].collection not in shown]
+    keys = [key for key, entry in _entries.items() if entry.scene == scene.session_uid]
+    return [key for key in keys if _entries[key].collection not in shown]
 
 
 def _forget(scene: Scene, key: str) -> None:

@@ -37,8 +37,8 @@ _UPRIGHT = np.eye(3)
 
 def single_seed(identifier: str, seed: int, frame: Floats = _UPRIGHT) -> Seeds:
     """One plant at the origin, of scale 1; its frame (3, 3) matters because leaves turn to the sky."""
-    own = {"seed": np.array([seed], dtype=np.int64), "frame": np.array(frame)[None]}
-    return replace(Seeds.upright(1), identifiers=(identifier,), **own)
+    fields = {"seed": np.array([seed], dtype=np.int64), "frame": np.array(frame)[None]}
+    return replace(Seeds.upright(1), identifiers=(identifier,), **fields)
 
 
 #: Polygons of a plant with the same materials: ``'bark'``, ``'leaf'`` or ``'blossom'``; form of leaf; buffers.
@@ -48,10 +48,10 @@ Part = tuple[str, int, MeshBuffers]
 def plant_parts(flora: Flora, seeds: Seeds) -> list[Part]:
     """All polygons of one plant at the origin, in its own space."""
     frame = seeds.frame[0].astype(np.float32)
-    found: dict[tuple[str, int], list[MeshBuffers]] = {}
+    pieces: dict[tuple[str, int], list[MeshBuffers]] = {}
     for block in expanded_blocks(flora, seeds):
-        found.setdefault((block.kind, block.form), []).append(block.buffers)
-    joined = [(*what, concatenate_buffers(buffers)) for what, buffers in sorted(found.items())]
+        pieces.setdefault((block.kind, block.form), []).append(block.buffers)
+    joined = [(*what, concatenate_buffers(buffers)) for what, buffers in sorted(pieces.items())]
     # Row vectors times the frame are rotated back.
     return [(kind, form, replace(b, positions=b.positions @ frame)) for kind, form, b in joined if b is not None]
 
@@ -104,7 +104,7 @@ def make_plant_mesh_steps(data: JobData, plants: Iterable[bpy.types.Object]) -> 
     faces = sum(coarse_faces(floras[s.identifiers[0]], s) for s in seeds)
     what = "A mesh of a plant" if len(plants) == 1 else f"Meshes of {len(plants):,} plants"
     check_fits(what, faces, memory_left(scene), "or select fewer plants")
-    made, data_made, switched = [], [], []
+    objects, data_made, switched = [], [], []
     whole = False
     try:
         for number, (plant, seed) in enumerate(zip(plants, seeds, strict=True)):
@@ -116,19 +116,19 @@ def make_plant_mesh_steps(data: JobData, plants: Iterable[bpy.types.Object]) -> 
             mesh = plant_mesh(scene, f"{plant.name} mesh", flora.species[0], parts)
             data_made += [mesh, *mesh.materials]
             size = placed.scale[number] * seed.scale[0]
-            made.append(_placed(mesh, plant, placed.frame[number] * size, placed.position[number]))
-            data.add("a mesh that it made", made[-1], mesh)
+            objects.append(_placed(mesh, plant, placed.frame[number] * size, placed.position[number]))
+            data.add("a mesh that it made", objects[-1], mesh)
             if plant.tetflora.enabled:
                 plant.tetflora.enabled = False
                 switched.append(plant)
         whole = True
     finally:
         if not whole:
-            bpy.data.batch_remove([obj for obj in made if is_there(obj)])
+            bpy.data.batch_remove([obj for obj in objects if is_there(obj)])
             remove_made(data_made)
             for plant in filter(is_there, switched):
                 plant.tetflora.enabled = True
-    return made
+    return objects
 
 
 def _placed(mesh: bpy.types.Mesh, plant: bpy.types.Object, frame: Floats, position: Floats) -> bpy.types.Object:

@@ -128,17 +128,17 @@ def write_assets(run: _Run, plan: AssetPlan) -> Job[None]:
     yield progress
     whole = plan.originals[~alone[owner[plan.originals]]]
     for number, (target, shown, rows) in enumerate(_groups(bound, asset[whole], owner[whole])):
-        at = whole[rows]
+        group = whole[rows]
         source = target.datablock or carrier_of(results, target)
-        add_instances(results, f"{target.name} {number:03d}", source, bound.matrices[at], ids[at], shown)
+        add_instances(results, f"{target.name} {number:03d}", source, bound.matrices[group], ids[group], shown)
         yield progress
     statistics.instances_whole = len(whole) + int(alone[owner[plan.originals]].sum())
-    for own, maker in ((plan.meshes, _clusters), (plan.kites, _kites)):
+    for parts, maker in ((plan.meshes, _clusters), (plan.kites, _kites)):
         for target in range(len(bound.targets)):
-            rows = np.flatnonzero(asset[own.instance] == target)
+            rows = np.flatnonzero(asset[parts.instance] == target)
             if len(rows):
-                cluster = own.cluster[rows] - bound.placed.assets.root[target]
-                yield from _write_clusters(run, target, cluster, own.instance[rows], ids, maker)
+                cluster = parts.cluster[rows] - bound.placed.assets.root[target]
+                yield from _write_clusters(run, target, cluster, parts.instance[rows], ids, maker)
     for number, shown in enumerate(bound.owners):
         if _scatters(shown) and not alone[number]:
             run.originals.append(shown)
@@ -213,8 +213,8 @@ def _write_clusters(
     shown = bound.owner[instance]
     for number, who in enumerate(np.unique(shown).tolist()):
         rows = np.flatnonzero(shown == who)
-        at = instance[rows]
-        places = pick[rows].astype(np.int32), bound.matrices[at], ids[at]
+        group = instance[rows]
+        places = pick[rows].astype(np.int32), bound.matrices[group], ids[group]
         add_cluster_instances(results, f"{name} clusters {number:03d}", objects, *places, bound.owners[who])
     run.statistics.instances_clusters += len(cluster)
 
@@ -274,8 +274,8 @@ def _of_all_ages(run: _Run, blocks: Iterator[int | Block | Buffers]) -> Iterator
         parts: dict[tuple[int, str, int], list[Block]] = {}
         for block in run_of:
             parts.setdefault((same[block.species], block.kind, block.form), []).append(block)
-        for some in parts.values():
-            yield replace(some[-1], buffers=concatenate_buffers([block.buffers for block in some]))
+        for alike in parts.values():
+            yield replace(alike[-1], buffers=concatenate_buffers([block.buffers for block in alike]))
 
 
 def _write_polygons(run: _Run, blocks: Iterator[PolygonBlock]) -> Job[None]:

@@ -81,7 +81,7 @@ def on_render_pre(scene: bpy.types.Scene, _depsgraph: object = None) -> None:
     _rendering.outer = _rendering.outer or scene.session_uid
     if scene.session_uid not in _rendering.scenes:
         _rendering.scenes.append(scene.session_uid)
-    made = False
+    refined = False
     try:
         wanted = scene.tetflora.refine_at_render and scene.tetflora.output.show_render
         # What is hidden may be in no collection meanwhile.
@@ -95,7 +95,7 @@ def on_render_pre(scene: bpy.types.Scene, _depsgraph: object = None) -> None:
                     in_main_thread(make)
                 else:
                     make()
-            made = True
+            refined = True
         elif not scene.tetflora.refine_at_render and has_plants(scene):
             nothing = all(KIND not in obj for obj in scene.objects)
             if nothing and _warn("nothing is refined and Refine at Render is off, so the render shows no plants", ""):
@@ -111,7 +111,7 @@ def on_render_pre(scene: bpy.types.Scene, _depsgraph: object = None) -> None:
         _complain(scene, f"without plants: {text}")
         remember(text, error)
     finally:
-        if not made:
+        if not refined:
             restore_in_main_thread(partial(_take_back, scene))
             if has_results(scene):
                 _rendering.raised.setdefault(scene.session_uid, {}).update(raise_settings(scene))
@@ -194,9 +194,9 @@ def _make(scene: bpy.types.Scene) -> None:
         wanted.append((frame_cache.key_of(scene, depsgraph, layers, *read), layers, read))
     in_main_thread(partial(frame_cache.stow, scene, [key for key, *_ in wanted]))
     for key, layers, (camera, given) in wanted:
-        layer, there = layers[0], in_main_thread(partial(frame_cache.recall, scene, key))
-        new = [] if there is None else [there]
-        if there is None:
+        layer, cached = layers[0], in_main_thread(partial(frame_cache.recall, scene, key))
+        new = [] if cached is None else [cached]
+        if cached is None:
             options = {"for_render": True, "camera": camera, "given": given, "mark": key[:8], "tell": _tell}
             before = result_collections(scene, 'RENDER')
             statistics = refine.refine(scene, layer.depsgraph, beside=before, **options)
@@ -263,9 +263,9 @@ def _take_back(scene: bpy.types.Scene) -> None:
 
 
 def _lower(scene: int) -> None:
-    found = with_uid(bpy.data.scenes, scene)  # a script may delete it between two frames
-    for (engine, name), value in _rendering.raised.get(scene, {}).items() if found is not None else ():
-        setattr(getattr(found, engine), name, value)
+    datablock = with_uid(bpy.data.scenes, scene)  # a script may delete it between two frames
+    for (engine, name), value in _rendering.raised.get(scene, {}).items() if datablock is not None else ():
+        setattr(getattr(datablock, engine), name, value)
 
 
 def _show_hidden() -> None:
@@ -274,7 +274,7 @@ def _show_hidden() -> None:
 
 
 def _there(uids: list[int]) -> list[bpy.types.Collection]:
-    return [found for uid in uids if (found := with_uid(bpy.data.collections, uid)) is not None]
+    return [collection for uid in uids if (collection := with_uid(bpy.data.collections, uid)) is not None]
 
 
 def _warn(text: str, about: str) -> bool:

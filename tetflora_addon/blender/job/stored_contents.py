@@ -66,20 +66,20 @@ def _read(scene: Scene, layer: ViewLayer, shown: dict[int, bool]) -> Generator[N
     for obj in in_parts(layer.objects):
         group = obj.tetflora
         if group.is_plant or group.is_field:
-            own = field_kinds(obj) if group.is_field else (group.species,)
-            kinds.update(own)
-            said = own, group.seed, group.age, shown.get(obj.session_uid), obj.hide_render, group.enabled
+            species = field_kinds(obj) if group.is_field else (group.species,)
+            kinds.update(species)
+            said = species, group.seed, group.age, shown.get(obj.session_uid), obj.hide_render, group.enabled
             form = obj if group.is_field else group.skeleton
             add("the plants", obj, said, (yield from form_steps(form)) if form else None)
         elif (lamp := obj.type == 'LIGHT') or ((group.is_occluder or may_take_part(obj)) and not is_ours(obj)):
             said = obj.name_full, artists_flags(obj), (yield from form_steps(obj))
             add("the light" if lamp else "the meshes", obj, said, hideable=not lamp and may_take_part(obj))
         yield
-    for identifier, own, parts in [(key, one.object, one.collection) for key, one in asset_species(scene).items()]:
-        if identifier in kinds and own is not None:  # it stands where its plants do
-            turned = own.matrix_world if shown.get(own.session_uid) else own.matrix_basis
-            add("the meshes", None, identifier, turned.to_3x3()[:], (yield from form_steps(own)))
-        for obj in objects_within(parts) if identifier in kinds and own is None else ():
+    for identifier, species, parts in [(key, one.object, one.collection) for key, one in asset_species(scene).items()]:
+        if identifier in kinds and species is not None:  # it stands where its plants do
+            turned = species.matrix_world if shown.get(species.session_uid) else species.matrix_basis
+            add("the meshes", None, identifier, turned.to_3x3()[:], (yield from form_steps(species)))
+        for obj in objects_within(parts) if identifier in kinds and species is None else ():
             add("the meshes", obj, identifier, (yield from form_steps(obj)))
     return {part: f"{total % 2**64:016x}" for part, total in sums.items()}
 

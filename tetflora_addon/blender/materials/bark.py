@@ -237,10 +237,10 @@ def _grown(graph: Graph, given: dict[str, Term]) -> dict[str, Term]:
     # What does not say how thick it is may be no wood.
     damp = damp * graph.step(graph.attribute("tf_girth", "Fac"), *_MOSS_GIRTH)
     # Moss settles in what lies deep first.
-    there = damp * given["Moss"] * 0.45 + noise
-    moss = graph.step(there, 0.72, 0.92) * age
+    growth = damp * given["Moss"] * 0.45 + noise
+    moss = graph.step(growth, 0.72, 0.92) * age
     algae = graph.step(damp, 0.0, 0.8) * (given["Moss"] * age)
-    algae = graph.step(there, 0.45, 0.85) * (algae * 0.6)
+    algae = graph.step(growth, 0.45, 0.85) * (algae * 0.6)
     lichen = graph.step(noise, 0.37, 0.34) * (given["Lichen"] * age)
     light = graph.outputs("ShaderNodeRGBToBW", {"Color": color})["Val"]
     for tint, amount in ((_LICHEN, lichen), (_ALGAE, algae), (_MOSS, moss)):
@@ -296,12 +296,12 @@ def _knot(graph: Graph, place: Place, size: float, noise: Term, apart: float = 1
     """
     spacing = _KNOTS_APART * apart
     where = bent(place.round * (1.0 / spacing), noise, 0.35 * size / spacing)
-    found = points(graph, where)
-    there, how_large, _ = graph.parts(found["Color"])
+    nearest = points(graph, where)
+    chance, how_large, _ = graph.parts(nearest["Color"])
     # Those that are none are so small that nothing is within reach.
-    share = (there > _NO_KNOT) * (spacing / size) / (how_large * 0.6 + 0.4)
-    off = (where - found["Position"]) * share
-    return Knot(off, graph.vector('LENGTH', off) + (there < _NO_KNOT) * 100.0)
+    share = (chance > _NO_KNOT) * (spacing / size) / (how_large * 0.6 + 0.4)
+    off = (where - nearest["Position"]) * share
+    return Knot(off, graph.vector('LENGTH', off) + (chance < _NO_KNOT) * 100.0)
 
 
 def around(graph: Graph, place: Place, eye: Knot, size: float) -> Term:

@@ -119,8 +119,8 @@ def blade_version(kind: str) -> int:
 def _built(graph: Graph, given: dict[str, Term], name: str, blade: BladeLook) -> dict[str, Any]:
     """What the group's outputs are linked to, by name."""
     place = graph.attribute("UVMap", "Vector")
-    own = graph.math('FRACT', graph.vector('DOT_PRODUCT', graph.attribute("tf_color", "Vector"), _DIGITS))
-    moved = place + (17.0, 29.0, 0.0) * own
+    chance = graph.math('FRACT', graph.vector('DOT_PRODUCT', graph.attribute("tf_color", "Vector"), _DIGITS))
+    moved = place + (17.0, 29.0, 0.0) * chance
     geometry = graph.outputs("ShaderNodeNewGeometry")
     side = geometry["Backfacing"] * 2.0 + -1.0  # -1 above, 1 below
     noise = _noise(graph, moved, 7.0, 2.0)
@@ -129,14 +129,14 @@ def _built(graph: Graph, given: dict[str, Term], name: str, blade: BladeLook) ->
     if blade.veins:
         asked = {"Place": place} | {key: given[key] for key in ("Veins", "Midrib", "Vein Lines", "Dark Against Light")}
         outputs = [(output, 'Float') for output in ("Tone", "Glow", "Height")]
-        veins = graph.part(f"{name} Veins", _VERSION, asked, outputs, lambda *at: _venation(*at, blade))
+        veins = graph.part(f"{name} Veins", _VERSION, asked, outputs, lambda *group: _venation(*group, blade))
         tone, glow, height = (veins[output] for output, _ in outputs)
 
     back, through = (_varied(graph, mottled, *line) for line in ((tone, _VEIN_HUE), (glow, _THROUGH_HUE)))
     back = back * paler(side * given["Paler Underside"])
     back, through = (graph.tinted(given["Color"], color) for color in (back, through * tuple(THROUGH_TINT.tolist())))
     if blade.wear:
-        dead = _dead(graph, given, place, own, noise)
+        dead = _dead(graph, given, place, chance, noise)
         back, through = (graph.mixed(dead, *pair) for pair in ((back, _DEAD), (through, _DEAD_THROUGH)))
 
     return {
@@ -214,9 +214,9 @@ def _varied(graph: Graph, mottled: Term, tone: Term | None, hue: tuple[float, fl
     return gray if tone is None else gray + hue * tone
 
 
-def _dead(graph: Graph, given: dict[str, Term], place: Term, own: Term, noise: Term) -> Term:
+def _dead(graph: Graph, given: dict[str, Term], place: Term, chance: Term, noise: Term) -> Term:
     """Share of dead tissue: none on most leaves; on a few the tip, the ends of lobes, and spots."""
-    worn = (own - (1.0 - given["Wear"])) / graph.math('MAXIMUM', given["Wear"], 1e-3)
+    worn = (chance - (1.0 - given["Wear"])) / graph.math('MAXIMUM', given["Wear"], 1e-3)
     rim = worn * 0.18 + (noise * 0.7 + graph.vector('DISTANCE', place, (0.5, 0.4, 0.0)))
     return graph.step(graph.math('MAXIMUM', rim, noise * 1.6 + -0.2), 0.93, 1.0) * graph.step(worn, 0.0, 0.05)
 

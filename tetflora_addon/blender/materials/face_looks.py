@@ -62,13 +62,13 @@ class Pyramid:
         y, y0, y1 = _columns(v, self.height[level], self.rows[level], extension)
         first, stride = self.start[level], self.columns[level]
         low, high = first + y0 * stride, first + y1 * stride
-        found = self._texels(low + x0) * ((1 - x) * (1 - y))[..., None]
-        found += self._texels(low + x1) * (x * (1 - y))[..., None]
-        found += self._texels(high + x0) * ((1 - x) * y)[..., None]
-        found += self._texels(high + x1) * (x * y)[..., None]
+        texels = self._texels(low + x0) * ((1 - x) * (1 - y))[..., None]
+        texels += self._texels(low + x1) * (x * (1 - y))[..., None]
+        texels += self._texels(high + x0) * ((1 - x) * y)[..., None]
+        texels += self._texels(high + x1) * (x * y)[..., None]
         if extension == 'CLIP':
-            found[(u < 0) | (u > 1) | (v < 0) | (v > 1)] = 0
-        color, alpha = np.ascontiguousarray(np.moveaxis(found[..., :3], -1, 0)), found[..., 3].copy()
+            texels[(u < 0) | (u > 1) | (v < 0) | (v > 1)] = 0
+        color, alpha = np.ascontiguousarray(np.moveaxis(texels[..., :3], -1, 0)), texels[..., 3].copy()
         return color / np.maximum(alpha, 1e-6), alpha
 
     def _texels(self, index: Integers32) -> Floats32:
@@ -130,7 +130,7 @@ def _finest(image: bpy.types.Image, pixels: Floats32, weighted: bool, halvings: 
     # Pixels of floating point images are multiplied by their alpha already.
     associated = image.is_float and image.alpha_mode != 'CHANNEL_PACKED'
     step = max(1 << halvings, _PIXELS // width >> halvings << halvings)
-    found = np.zeros((-(-height // (1 << halvings)), -(-width // (1 << halvings)), 4), np.float16)
+    finest = np.zeros((-(-height // (1 << halvings)), -(-width // (1 << halvings)), 4), np.float16)
     for row in range(0, height, step):
         block = pixels[row : row + step]
         alpha = np.clip(block[..., 3:], 0, 1) if has_alpha else None
@@ -151,8 +151,8 @@ def _finest(image: bpy.types.Image, pixels: Floats32, weighted: bool, halvings: 
         for _ in range(halvings):
             out = _halved(out)
         start = row >> halvings
-        found[start : start + len(out)] = np.minimum(out, np.float32(60_000))
-    return found
+        finest[start : start + len(out)] = np.minimum(out, np.float32(60_000))
+    return finest
 
 
 def _halved(level: NDArray[np.floating]) -> Floats32:
@@ -275,17 +275,17 @@ class Plan:
         corners = {name: values[one] for name, values in corners.items()}
         extents = {name: _extents(corners[name]) for name in self.maps}
         parts = self._parts([length for length, _ in extents.values()], len(one), most)
-        found = np.zeros((len(one), 5), np.float32)
+        means = np.zeros((len(one), 5), np.float32)
         for n in np.unique(parts).tolist():
             rows = np.flatnonzero(parts == n)
             step = max(1, _BATCH // (n * n))
             for start in range(0, len(rows), step):
-                some = rows[start : start + step]
+                batch = rows[start : start + step]
                 part = np.float32(0 if self.uneven else 1 / n)
-                sizes = {name: height[None, some] * part for name, (_, height) in extents.items()}
-                points = _Sampled(self, {name: corners[name][some] for name in self.names}, sizes, n)
-                found[some] = _means_of(NodeValues(points, self.reader.curves).shader(self.surface))
-        return found[which]
+                sizes = {name: height[None, batch] * part for name, (_, height) in extents.items()}
+                points = _Sampled(self, {name: corners[name][batch] for name in self.names}, sizes, n)
+                means[batch] = _means_of(NodeValues(points, self.reader.curves).shader(self.surface))
+        return means[which]
 
     def _parts(self, lengths: list[Floats32], count: int, most: int) -> Integers32:
         """Parts along an edge of each triangle: a power of two that follows its texels, and fewer if they are many."""
@@ -415,9 +415,9 @@ class FaceReader:
 
     def prepare(self, mesh: bpy.types.Mesh, materials: list[bpy.types.Material | None]) -> "MeshLooks":
         """Read all that the looks of a mesh follow from, so that it need not be there any more afterward."""
-        made = MeshLooks(mesh, materials, self)
-        self.warn(problem for plan in made.plans for problem in plan.problems)
-        return made
+        looks = MeshLooks(mesh, materials, self)
+        self.warn(problem for plan in looks.plans for problem in plan.problems)
+        return looks
 
     def warn(self, problems: Iterable[str]) -> None:
         """Add those warnings that are new."""
@@ -457,14 +457,14 @@ class MeshLooks:
         face : (t,) int32
             Ascending.
         """
-        made = {name: np.ones(faces, np.float16) for name in ("transmission", "coverage", "roughness")}
-        made["color"] = np.zeros((faces, 3), np.float16)
+        looks = {name: np.ones(faces, np.float16) for name in ("transmission", "coverage", "roughness")}
+        looks["color"] = np.zeros((faces, 3), np.float16)
         if not any(plan.names for plan in self.plans):
             constant = np.array([plan.constant for plan in self.plans])
             for low in range(0, faces, _TRIANGLES):
                 slot = self._slot[low : low + _TRIANGLES]
-                self._write(made, slice(low, low + len(slot)), constant[slot], slot)
-            return made
+                self._write(looks, slice(low, low + len(slot)), constant[slot], slot)
+            return looks
         most = max(_POINTS, _ALL_POINTS // -(-len(face) // _TRIANGLES)) if len(face) else 0
         end = 0
         while end < len(face):
@@ -482,11 +482,11 @@ class MeshLooks:
                 total = np.maximum(np.bincount(of_face, areas, number), _TINY)
                 values = np.stack([np.bincount(of_face, column * areas, number) for column in values.T], axis=1)
                 values = values / total[:, None]
-            self._write(made, slice(low, high), values, slot)
+            self._write(looks, slice(low, high), values, slot)
             yield end / len(face)
-        return made
+        return looks
 
-    def _write(self, made: FaceLooks, faces: slice, values: NDArray[np.floating], slot: Integers32) -> None:
+    def _write(self, looks: FaceLooks, faces: slice, values: NDArray[np.floating], slot: Integers32) -> None:
         """Means over what is not transparent, from those over whole faces (n, 5)."""
         plain = np.array([plan.constant[1:4] / max(plan.constant[0], _LEAST) for plan in self.plans], np.float32)
         known = np.array([plan.is_known for plan in self.plans])
@@ -494,10 +494,10 @@ class MeshLooks:
         light = luminance(color.T)
         passed = np.divide(through, light, out=np.zeros_like(light), where=light > 1e-6)
         color = np.where((cover > _LEAST)[:, None], color / np.maximum(cover, _LEAST)[:, None], plain[slot])
-        made["color"][faces] = np.clip(color, 0, 1)
-        made["coverage"][faces] = np.clip(cover, 0, 1)
-        made["roughness"][faces] = np.array([roughness_of(material) for material in self.materials])[slot]
-        made["transmission"][faces] = np.where(known[slot], np.clip(passed, 0, 1), np.nan)
+        looks["color"][faces] = np.clip(color, 0, 1)
+        looks["coverage"][faces] = np.clip(cover, 0, 1)
+        looks["roughness"][faces] = np.array([roughness_of(material) for material in self.materials])[slot]
+        looks["transmission"][faces] = np.where(known[slot], np.clip(passed, 0, 1), np.nan)
 
     def _triangles(self, loops: NDArray, verts: NDArray, face: Integers32, slot: Integers32, most: int) -> Floats32:
         """Means (t, 5) over some triangles, see `Plan.constant`."""
@@ -514,8 +514,8 @@ class MeshLooks:
         """Values of an attribute at the corners of some triangles: (t, 3, width)."""
         domain, values = self._values[name]
         rows = {'FACE': np.broadcast_to(face[:, None], loops.shape), 'CORNER': loops}.get(domain, verts)
-        found = np.nan_to_num(np.take(values, rows, axis=0).astype(np.float32, copy=False), posinf=0, neginf=0)
-        return np.clip(found, -_FAR, _FAR, out=found)
+        corners = np.nan_to_num(np.take(values, rows, axis=0).astype(np.float32, copy=False), posinf=0, neginf=0)
+        return np.clip(corners, -_FAR, _FAR, out=corners)
 
 
 def roughness_of(material: bpy.types.Material | None) -> float:

@@ -105,10 +105,10 @@ def bark_material(species_name: str, character: str = "ridged") -> bpy.types.Mat
     return surface_material(f"TetFlora {species_name} bark", bark_version(character), build)
 
 
-def proxy_material(own: bool = False) -> bpy.types.Material:
+def proxy_material(asset: bool = False) -> bpy.types.Material:
     """Material "TetFlora proxy" of all microsurfaces: as a leaf where ``tf_transmission`` is above 0, else as bark.
 
-    own: "TetFlora asset proxy", for what stands for the artist's own materials, which mostly are Principled.
+    asset: "TetFlora asset proxy", for what stands for the artist's own materials, which mostly are Principled.
 
     Notes
     -----
@@ -119,7 +119,7 @@ def proxy_material(own: bool = False) -> bpy.types.Material:
     def build(graph: Graph, _material: bpy.types.Material) -> None:
         geometry = graph.outputs("ShaderNodeNewGeometry")
         plain = _proxy_looks(graph, geometry["Normal"])
-        if own:
+        if asset:
             _lead_out(graph, _principled(graph))
             return
         side = geometry["Backfacing"] * 2.0 + -1.0
@@ -132,10 +132,10 @@ def proxy_material(own: bool = False) -> bpy.types.Material:
         scattered = graph.outputs("ShaderNodeLightPath")["Is Diffuse Ray"]
         _lead_out(graph, graph.mix(scattered, _scattered(graph, sides), _scattered(graph, plain)))
 
-    return surface_material(ASSET_PROXY if own else PROXY, _PROXY_VERSION, build)
+    return surface_material(ASSET_PROXY if asset else PROXY, _PROXY_VERSION, build)
 
 
-def sphere_material(own: bool = False) -> bpy.types.Material:
+def sphere_material(asset: bool = False) -> bpy.types.Material:
     """Material "TetFlora microsphere" of all microspheres: that of microsurfaces with the sphere's own normal.
 
     Cycles meets spheres of a point cloud only from outside. So light that falls on a sphere is reflected by the half
@@ -145,11 +145,11 @@ def sphere_material(own: bool = False) -> bpy.types.Material:
 
     def build(graph: Graph, material: bpy.types.Material) -> None:
         normal = graph.outputs("ShaderNodeNewGeometry")["Normal"]
-        shader = _principled(graph) if own else _scattered(graph, _proxy_looks(graph, normal))
+        shader = _principled(graph) if asset else _scattered(graph, _proxy_looks(graph, normal))
         _lead_out(graph, shader, graph.attribute("radius", "Fac") * 2.0)
         material.thickness_mode = 'SLAB'
 
-    return surface_material(ASSET_SPHERE if own else SPHERE, _SPHERE_VERSION, build)
+    return surface_material(ASSET_SPHERE if asset else SPHERE, _SPHERE_VERSION, build)
 
 
 def baked_material() -> bpy.types.Material:

@@ -300,9 +300,9 @@ def _baked_shell_group() -> bpy.types.NodeTree:
             parts = []
             for light, level, slope in zip(lights, path.levels, path.slopes, strict=True):
                 # λ at the hit and at the other end, each with its weight; the near end is where the ray came from.
-                there = path.length * slope * -1.0 + level
-                change = (there - level) * path.leaving
-                near, far = level + change, there - change
+                other_end = path.length * slope * -1.0 + level
+                change = (other_end - level) * path.leaving
+                near, far = level + change, other_end - change
                 parts.append(light * (far * last + near * first))
             total = sum(parts[1:], parts[0])
             emission = graph.node("ShaderNodeEmission", {"Color": total, "Strength": given["Strength"]})
@@ -407,9 +407,9 @@ def _eye_distance(graph: Graph, incoming: Term) -> Term:
 
 def _end_weights(graph: Graph, depth: Term) -> tuple[Term, Term]:
     """Weights w₀ and w₁ of the light at the near and the far end; by series where τ is small."""
-    thin, some = depth < _THIN, graph.math('MAXIMUM', depth, _THIN)
-    clear = graph.math('EXPONENT', -some)
-    mean = (1.0 - clear) / some
+    thin, thick = depth < _THIN, graph.math('MAXIMUM', depth, _THIN)
+    clear = graph.math('EXPONENT', -thick)
+    mean = (1.0 - clear) / thick
     weights = []
     # τ/2 − τ²/6 + τ³/24 and τ/2 − τ²/3 + τ³/8
     for value, (second, third) in zip((1.0 - mean, mean - clear), ((-1 / 6, 1 / 24), (-1 / 3, 1 / 8)), strict=True):

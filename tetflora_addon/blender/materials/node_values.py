@@ -371,8 +371,8 @@ class NodeValues:
         if node.vector_type == 'TEXTURE':
             linear, vector, move = np.linalg.pinv(linear), vector - move, np.zeros_like(shift)
         self._scale *= float(np.sqrt(abs(np.linalg.det(linear[:2, :2]))))
-        made = np.tensordot(linear.astype(np.float32), vector, axes=1) + move
-        return made if node.vector_type != 'NORMAL' else _ratio(made, np.linalg.norm(made, axis=0, keepdims=True))
+        mapped = np.tensordot(linear.astype(np.float32), vector, axes=1) + move
+        return mapped if node.vector_type != 'NORMAL' else _ratio(mapped, np.linalg.norm(mapped, axis=0, keepdims=True))
 
     def _of_mix(self, node, socket, stack) -> Values:
         kind = node.data_type
@@ -386,13 +386,13 @@ class NodeValues:
         factor = np.clip(factor, 0, 1) if node.clamp_factor else factor
         read = self.number if kind == 'FLOAT' else self.color
         a, b = read(node, f"A_{word}", stack), read(node, f"B_{word}", stack)
-        made = self._blend(node.blend_type if kind == 'RGBA' else 'MIX', a, b, factor)
-        return np.clip(made, 0, 1) if kind == 'RGBA' and node.clamp_result else made
+        mixed = self._blend(node.blend_type if kind == 'RGBA' else 'MIX', a, b, factor)
+        return np.clip(mixed, 0, 1) if kind == 'RGBA' and node.clamp_result else mixed
 
     def _of_mix_rgb(self, node, _socket, stack) -> Values:
         a, b = self.color(node, "Color1", stack), self.color(node, "Color2", stack)
-        made = self._blend(node.blend_type, a, b, np.clip(self.number(node, "Fac", stack), 0, 1))
-        return np.clip(made, 0, 1) if node.use_clamp else made
+        mixed = self._blend(node.blend_type, a, b, np.clip(self.number(node, "Fac", stack), 0, 1))
+        return np.clip(mixed, 0, 1) if node.use_clamp else mixed
 
     def _blend(self, kind: str, a: Values, b: Values, factor: Values) -> Values:
         if kind not in {'MIX', 'MULTIPLY', 'ADD', 'SUBTRACT', 'SCREEN', 'LINEAR_LIGHT'}:
@@ -404,8 +404,8 @@ class NodeValues:
         hue, saturation, value, factor = (self.number(node, key, stack) for key in keys)
         h, s, v = to_hsv(color)
         h = h + hue + np.float32(0.5)
-        made = from_hsv(_stacked(h - np.floor(h), np.clip(s * saturation, 0, 1), v * value))
-        return np.maximum(color + factor * (made - color), 0)
+        shifted = from_hsv(_stacked(h - np.floor(h), np.clip(s * saturation, 0, 1), v * value))
+        return np.maximum(color + factor * (shifted - color), 0)
 
     def _of_gamma(self, node, _socket, stack) -> Values:
         return np.maximum(self.color(node, "Color", stack), 0) ** self.number(node, "Gamma", stack)
@@ -419,8 +419,8 @@ class NodeValues:
         return color + factor * (1 - 2 * color)
 
     def _of_math(self, node, socket, stack) -> Values:
-        made = self._compute(node, socket, [s for s in node.inputs if s.enabled], stack, self.number)
-        return np.clip(made, 0, 1) if node.use_clamp else made
+        values = self._compute(node, socket, [s for s in node.inputs if s.enabled], stack, self.number)
+        return np.clip(values, 0, 1) if node.use_clamp else values
 
     def _of_vect_math(self, node, socket, stack) -> Values:
         if node.operation == 'SCALE':
@@ -433,10 +433,10 @@ class NodeValues:
             if node.operation == 'DOT_PRODUCT':
                 return (first * rest[0]).sum(axis=0)
             return np.sqrt(((first - (rest[0] if rest else 0)) ** 2).sum(axis=0))
-        made = self._compute(node, socket, operands, stack, self.color)
+        values = self._compute(node, socket, operands, stack, self.color)
         if node.operation == 'MULTIPLY' and not operands[1].is_linked:
             self._scale *= float(np.sqrt(abs(np.prod(operands[1].default_value[:2]))))
-        return made
+        return values
 
     def _compute(self, node, socket, operands, stack: Stack, read: Callable) -> Values:
         work = MATHS.get(node.operation)
@@ -449,8 +449,8 @@ class NodeValues:
     def _of_valtorgb(self, node, socket, stack) -> Values:
         self._points.uneven = True
         table = self._table(node.color_ramp, node.color_ramp.evaluate)
-        made = _looked_up(table, self.number(node, "Fac", stack))
-        return made[3] if socket.identifier == "Alpha" else made[:3]
+        rgba = _looked_up(table, self.number(node, "Fac", stack))
+        return rgba[3] if socket.identifier == "Alpha" else rgba[:3]
 
     def _of_curve_rgb(self, node, _socket, stack) -> Values:
         mapping = node.mapping
@@ -465,8 +465,8 @@ class NodeValues:
             mapping, lambda x: [mapping.evaluate(c, mapping.evaluate(curves[3], x)) for c in curves[:3]]
         )
         color, factor = self.color(node, "Color", stack), self.number(node, "Fac", stack)
-        made = np.stack([_looked_up(table[:, i : i + 1], color[i])[0] for i in range(3)])
-        return color + factor * (made - color)
+        curved = np.stack([_looked_up(table[:, i : i + 1], color[i])[0] for i in range(3)])
+        return color + factor * (curved - color)
 
     def _table(self, of: ColorRamp | CurveMapping, value: Callable[[float], Sequence[float]]) -> Floats32:
         key = repr(settings_of(of))  # between two steps a node may change, or another may have its address
@@ -484,9 +484,9 @@ class NodeValues:
         if kind != 'LINEAR':
             x = np.clip(x, 0, 1)
             x = x * x * (3 - 2 * x) if kind == 'SMOOTHSTEP' else x * x * x * (x * (x * 6 - 15) + 10)
-        made = to_low + x * (to_high - to_low)
+        mapped = to_low + x * (to_high - to_low)
         clamped = node.clamp and kind == 'LINEAR'
-        return np.clip(made, np.minimum(to_low, to_high), np.maximum(to_low, to_high)) if clamped else made
+        return np.clip(mapped, np.minimum(to_low, to_high), np.maximum(to_low, to_high)) if clamped else mapped
 
     def _of_clamp(self, node, _socket, stack) -> Values:
         value, low, high = (self.number(node, key, stack) for key in ("Value", "Min", "Max"))

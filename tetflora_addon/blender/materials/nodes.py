@@ -58,17 +58,17 @@ def _get_or_create(
     What an artist edited or put there under this name comes back untouched. An outdated datablock of ours, which may be
     edited, gets another name and is the artist's; a linked one keeps its own.
     """
-    found = collection.get((name, None)) or collection.get(name)
-    if found is not None:
-        if not is_ours(found) or found.get(VERSION) == version:
-            return found
-        if found.library is None:
-            found.name = f"{name} (version {found.get(VERSION, 0)})"
-    made = new(name)
-    build(made)
-    made[VERSION] = version
-    tag(made)
-    return made
+    existing = collection.get((name, None)) or collection.get(name)
+    if existing is not None:
+        if not is_ours(existing) or existing.get(VERSION) == version:
+            return existing
+        if existing.library is None:
+            existing.name = f"{name} (version {existing.get(VERSION, 0)})"
+    datablock = new(name)
+    build(datablock)
+    datablock[VERSION] = version
+    tag(datablock)
+    return datablock
 
 
 class Term:
@@ -259,7 +259,7 @@ class Graph:
             fed[number[link.from_node.as_pointer()]].add(number[link.to_node.as_pointer()])
         column = [0] * len(nodes)
         for here in TopologicalSorter(fed).static_order():  # what it feeds comes first
-            column[here] = max((column[there] + 1 for there in fed[here]), default=0)
+            column[here] = max((column[target] + 1 for target in fed[here]), default=0)
         rows: dict[int, int] = {}
         places = []
         for place in column:
@@ -317,11 +317,11 @@ def node_group(
         for label, kind, *more in inputs:
             default, limits, description = (*more, *(None, None, "")[len(more) :])
             about = {"name": label, "description": description, "socket_type": f"NodeSocket{kind}"}
-            made = tree.interface.new_socket(in_out='INPUT', **about)
+            socket = tree.interface.new_socket(in_out='INPUT', **about)
             if limits is not None:
-                made.min_value, made.max_value = limits
+                socket.min_value, socket.max_value = limits
             if default is not None:
-                made.default_value = default
+                socket.default_value = default
         for output, kind in outputs:
             tree.interface.new_socket(name=output, in_out='OUTPUT', socket_type=f"NodeSocket{kind}")
         graph = Graph(tree)
@@ -336,10 +336,10 @@ def node_group(
 def surface_material(name: str, version: int, build: Callable[[Graph, bpy.types.Material], None]) -> bpy.types.Material:
     """A material with nodes, as `_get_or_create` finds or makes it; `build` may change its viewport color."""
 
-    def fill(made: bpy.types.Material) -> None:
-        made.diffuse_color = LEAF_GREEN
-        graph = Graph(shader_tree(made))
-        build(graph, made)
+    def fill(material: bpy.types.Material) -> None:
+        material.diffuse_color = LEAF_GREEN
+        graph = Graph(shader_tree(material))
+        build(graph, material)
         graph.arrange()
 
     return _get_or_create(bpy.data.materials, name, version, bpy.data.materials.new, fill)

@@ -59,8 +59,8 @@ def fit(materials: Iterable[bpy.types.Material | None]) -> None:
     """Put snow on TetFlora's own materials if a scene of the file has any, and take it from them otherwise."""
     snowy = any(has_snow(scene) for scene in bpy.data.scenes)
     for material in set(materials) - {None}:
-        own = is_own(material) or is_soil(material)
-        if not own or material.node_tree is None or material.name.startswith(_OTHERS):
+        ours = is_own(material) or is_soil(material)
+        if not ours or material.node_tree is None or material.name.startswith(_OTHERS):
             continue
         if material.name in _CLOUDS:
             _fit_cloud(snowy)

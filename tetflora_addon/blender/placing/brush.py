@@ -62,23 +62,23 @@ class Standing:
 
     def __init__(self, scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, covers: bool) -> None:
         """Read a scene, with or without what covers the ground."""
-        found = scene.objects if covers else canopy.not_of_covers(scene)
-        self.objects = plant_objects.plants_of(found)
-        self.fields = fields_of(found)
+        objects = scene.objects if covers else canopy.not_of_covers(scene)
+        self.objects = plant_objects.plants_of(objects)
+        self.fields = fields_of(objects)
         places = [np.array([o.matrix_world.translation for o in self.objects], np.float64).reshape(-1, 3)]
         source, number = [np.full(len(self.objects), _OBJECTS)], [np.arange(len(self.objects))]
         free = [o.library is None and o.override_library is None and o.visible_get() for o in self.objects]
         removable = [np.array(free, bool)]
         for index, field in enumerate(self.fields):
-            own = plant_objects.editable(field)
-            if own:
-                found = plant_objects.positions(field)
+            editable = plant_objects.editable(field)
+            if editable:
+                points = plant_objects.positions(field)
             else:
-                found = read_field(field, depsgraph, world_matrix(field, depsgraph)[None]).position
-            places.append(found)
-            source.append(np.full(len(found), index))
-            number.append(np.arange(len(found)))
-            removable.append(np.full(len(found), own and field.visible_get()))
+                points = read_field(field, depsgraph, world_matrix(field, depsgraph)[None]).position
+            places.append(points)
+            source.append(np.full(len(points), index))
+            number.append(np.arange(len(points)))
+            removable.append(np.full(len(points), editable and field.visible_get()))
         self.places = np.concatenate(places)  # (n, 3): world space
         #: number: (n,): Index into ``objects``, or point of the field
         #: source: (n,): Index into ``fields``, or -1 for ``objects``
@@ -94,16 +94,16 @@ class Standing:
 
     def by_population(self, gone: Mask) -> dict[str, Floats]:
         """Places of plants, (n,) bool, by the identity of their population; without those of none."""
-        found: dict[str, list[Floats]] = {}
+        by_uid: dict[str, list[Floats]] = {}
         for source in np.unique(self.source[gone]).tolist():
-            own = np.flatnonzero(gone & (self.source == source))
+            plants = np.flatnonzero(gone & (self.source == source))
             if source != _OBJECTS:
-                found.setdefault(self.fields[source].tetflora.population, []).append(self.places[own])
+                by_uid.setdefault(self.fields[source].tetflora.population, []).append(self.places[plants])
                 continue
-            uids = np.array([self.objects[i].tetflora.population for i in self.number[own].tolist()])
+            uids = np.array([self.objects[i].tetflora.population for i in self.number[plants].tolist()])
             for uid in np.unique(uids).tolist():
-                found.setdefault(uid, []).append(self.places[own[uids == uid]])
-        return {uid: np.concatenate(places) for uid, places in found.items() if uid}
+                by_uid.setdefault(uid, []).append(self.places[plants[uids == uid]])
+        return {uid: np.concatenate(places) for uid, places in by_uid.items() if uid}
 
     def remove(self, gone: Mask) -> None:
         """Take plants, (n,) bool, out of the scene and out of the arrays."""
@@ -113,12 +113,12 @@ class Standing:
             bpy.data.batch_remove([self.objects[i] for i in dead])
             self.objects = [o for i, o in enumerate(self.objects) if i not in dead]
         for source in np.unique(self.source[gone]).tolist():
-            own = self.source == source
-            keep = np.ones(int(own.sum()), bool)
-            keep[self.number[gone & own]] = False
+            of_source = self.source == source
+            keep = np.ones(int(of_source.sum()), bool)
+            keep[self.number[gone & of_source]] = False
             if source != _OBJECTS:
                 plant_objects.take_points(self.fields[source], keep)
-            self.number[own] = (np.cumsum(keep) - 1)[self.number[own]]
+            self.number[of_source] = (np.cumsum(keep) - 1)[self.number[of_source]]
         self.places, self.source = self.places[~gone], self.source[~gone]
         self.number, self.removable = self.number[~gone], self.removable[~gone]
 
@@ -231,7 +231,7 @@ class Stroke:
             standing.add(places, _OBJECTS, first)
             return
         painted = (o.get(plant_objects.PAINTED_MARK) and plant_objects.editable(o) for o in standing.fields)
-        number = next((i for i, own in enumerate(painted) if own), None)
+        number = next((i for i, editable in enumerate(painted) if editable), None)
         if number is None:
             number = len(standing.fields)
             field = plant_objects.add_field(self.scene, placement, species)

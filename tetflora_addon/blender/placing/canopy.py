@@ -62,11 +62,11 @@ def canopy_steps(progress: Progress, scene: bpy.types.Scene, depsgraph: bpy.type
     numbers: dict[str, int] = {}
     species, crowns = [], []
     for _, _, form, kinds, which, taller in parts:
-        own = [crown_for(scene, kind) for kind in kinds]
-        known = np.array([(c.radius, c.base, c.height, c.leaves) for c in own]).reshape(-1, 4)[which]
+        per_kind = [crown_for(scene, kind) for kind in kinds]
+        known = np.array([(c.radius, c.base, c.height, c.leaves) for c in per_kind]).reshape(-1, 4)[which]
         crowns.append(_shaped(known, form) * taller[:, None] ** [1, 1, 1, 2])
-        own = [numbers.setdefault(species_of(kind), len(numbers)) for kind in kinds]
-        species.append(np.array(own, dtype=np.int32)[which])
+        per_kind = [numbers.setdefault(species_of(kind), len(numbers)) for kind in kinds]
+        species.append(np.array(per_kind, dtype=np.int32)[which])
     position, size = (np.concatenate([part[i] for part in parts]) for i in (0, 1))
     radius, base, top, area = np.concatenate(crowns).T
     canopy = Canopy(position, radius * size, base * size, top * size, area * size**2, np.concatenate(species))
@@ -93,9 +93,9 @@ def floor_steps(canopy: Canopy, triangles: Floats, kinds: int) -> Generator[floa
         content.update(np.ascontiguousarray(getattr(ordered, column.name)).tobytes())
     key = content.hexdigest()
     if key not in _kept:
-        made = yield from mapping(sheet, ordered, kinds)
+        floor = yield from mapping(sheet, ordered, kinds)
         _kept.clear()
-        _kept[key] = made
+        _kept[key] = floor
     return _kept[key]
 
 

@@ -117,8 +117,8 @@ def cover_steps(
     scene, depsgraph, uid = data.scene, data.depsgraph, population.uid or ANYBODY
     grounds, (canopy, above) = yield from _begun(data, population, grounds)
     population = _again(data, population, uid)
-    own = {name: getattr(population, name) for name in terrain.MASKS} | dict(masks)
-    ground = terrain.read_ground(grounds, depsgraph, **own)
+    all_masks = {name: getattr(population, name) for name in terrain.MASKS} | dict(masks)
+    ground = terrain.read_ground(grounds, depsgraph, **all_masks)
     if not len(canopy):
         raise SceneError(f'"{population.name}" has no plants whose ground could be covered; click Update first')
     yield (progress := Progress(0.05, _UNDER))
@@ -129,15 +129,15 @@ def cover_steps(
     population = _again(data, population, uid)
     with populations.restored(scene):
         parts = _parts(scene, canopy, above)
-        found = cover_of(scene, uid) or _add_cover(scene, population, grounds, masks)
+        cover = cover_of(scene, uid) or _add_cover(scene, population, grounds, masks)
         # What falls from crowns lies under these only, and takes no plants from the rest of the ground.
         suited = [floor.map_of(Habitat[part.habitat], shedder_of(part, above)).mean() for part in parts]
         area = ground.map_area * float(np.average(suited, weights=[part.number for part in parts]))
-        _mix(found, parts, area)
-        with closing(populations.make_plants_steps(scene, depsgraph, found)) as steps:
-            made = yield from part_of(steps, _PLANTING, 1.0)
+        _mix(cover, parts, area)
+        with closing(populations.make_plants_steps(scene, depsgraph, cover)) as steps:
+            placed = yield from part_of(steps, _PLANTING, 1.0)
         bare = _lay_soil(scene, cover_of(scene, uid), grounds, floor, above, area) if soil else []
-    return CoverResult(made, bare)
+    return CoverResult(placed, bare)
 
 
 def _begun(
@@ -146,9 +146,9 @@ def _begun(
     """See whether a population can have a cover, and measure what stands above; with its ground, or that given."""
     scene = data.scene
     yield (progress := Progress(0.0, _UNDER))
-    found = cover_of(scene, population.uid or ANYBODY, fallen)
-    if found is not None:
-        populations.refuse_frozen(found)
+    cover = cover_of(scene, population.uid or ANYBODY, fallen)
+    if cover is not None:
+        populations.refuse_frozen(cover)
     grounds = rules.checked_grounds(scene, population) if grounds is None else list(grounds)
     data.add_objects(grounds)
     return grounds, (yield from canopy_steps(progress, scene, data.depsgraph))
@@ -161,8 +161,8 @@ def _again(data: JobData, population: PropertyGroup, uid: str) -> PropertyGroup:
 
 def cover_of(scene: Scene, uid: str, fallen: bool = False) -> PropertyGroup | None:
     """What covers the ground of a population, or the leaves that fall on it in autumn."""
-    found = (p for p in scene.tetflora.layers if p.covers == uid or (p.uid == uid and is_cover(p)))
-    return next((p for p in found if (bool(p.mix) and all(e.habitat == 'FALLEN' for e in p.mix)) == fallen), None)
+    covers = (p for p in scene.tetflora.layers if p.covers == uid or (p.uid == uid and is_cover(p)))
+    return next((p for p in covers if (bool(p.mix) and all(e.habitat == 'FALLEN' for e in p.mix)) == fallen), None)
 
 
 def _add_cover(
@@ -193,8 +193,8 @@ def _parts(scene: Scene, canopy: Canopy, above: tuple[str, ...]) -> list[Ingredi
     parts = [Ingredient(*one) for one in GROWN if one[0] in known]
     order = _shedders(canopy, above)
     for kind, habitat, number, most in DROPPED:
-        made = [(name, fallen) for name in order if (fallen := fallen_from(scene, name, kind))][:most]
-        parts += [Ingredient(fallen, habitat, number, name) for name, fallen in made]
+        dropped = [(name, fallen) for name in order if (fallen := fallen_from(scene, name, kind))][:most]
+        parts += [Ingredient(fallen, habitat, number, name) for name, fallen in dropped]
     return parts
 
 
@@ -226,10 +226,10 @@ def fallen_from(scene: Scene, identifier: str, kind: str) -> str:
 
 def _mix(cover: PropertyGroup, parts: list[Ingredient], area: float) -> None:
     """Add what the mixture of a cover lacks; what it has stays as the artist left it."""
-    there = {entry.species for entry in cover.mix}
+    present = {entry.species for entry in cover.mix}
     before = sum(entry.weight for entry in cover.mix)
     for part in parts:
-        if part.species not in there:
+        if part.species not in present:
             entry = cover.mix.add()
             entry.species, entry.weight = part.species, part.number
             entry.habitat, entry.shed_by = part.habitat, part.shed_by
@@ -300,10 +300,10 @@ def strew_steps(data: JobData, population: PropertyGroup) -> Job[populations.Pla
                 parts.append(Ingredient(patch, 'FALLEN', FULL * share / (area * _SQUARE), name))
         if not parts:
             return None
-        found = cover_of(scene, uid, fallen=True) or _add_cover(scene, population, grounds, {}, FALLEN_LEAVES)
+        cover = cover_of(scene, uid, fallen=True) or _add_cover(scene, population, grounds, {}, FALLEN_LEAVES)
         # Ground that is wholly suited, of all that falls on it.
-        _mix(found, parts, canopy.area.sum() / FULL / len(parts))
-        with closing(populations.make_plants_steps(scene, depsgraph, found)) as steps:
+        _mix(cover, parts, canopy.area.sum() / FULL / len(parts))
+        with closing(populations.make_plants_steps(scene, depsgraph, cover)) as steps:
             return (yield from steps)
 
 
@@ -317,7 +317,7 @@ def cover_with_snow(scene: Scene, population: PropertyGroup) -> list[str]:
     """
     slots = [slot for obj in rules.grounds_of(scene, population) for slot in obj.material_slots]
     materials = dict.fromkeys(slot.material for slot in slots if slot.material is not None)
-    own = [one for one in materials if one.library is None and one.override_library is None and one.node_tree]
-    if not own:
+    local = [one for one in materials if one.library is None and one.override_library is None and one.node_tree]
+    if not local:
         raise SceneError(f'The ground of "{population.name}" has no material in this file; give it one first')
-    return [material.name for material in own if add_snow(material)]
+    return [material.name for material in local if add_snow(material)]

@@ -169,10 +169,10 @@ def _scene_for(context: bpy.types.Context) -> tuple[bpy.types.Scene, str]:
         for name in ("Cube", "Light"):
             scene.objects[name].hide_viewport = scene.objects[name].hide_render = True
         return scene, "the default cube and light are hidden, the camera is kept"
-    made = bpy.data.scenes.new(NAME)
+    new_scene = bpy.data.scenes.new(NAME)
     if context.window is not None:
-        context.window.scene = made
-    return made, f'in a new scene; "{scene.name}" is unchanged'
+        context.window.scene = new_scene
+    return new_scene, f'in a new scene; "{scene.name}" is unchanged'
 
 
 def _ground() -> bpy.types.Object:
@@ -257,8 +257,8 @@ def _settings(scene: bpy.types.Scene) -> None:
         wanted["cycles"] = {"samples": SAMPLES, "use_denoising": True, "use_adaptive_sampling": True}
         wanted["cycles"] |= {"adaptive_threshold": 0.1, "max_bounces": 4}
     for group, values in wanted.items():
-        own, fresh = getattr(scene, group), getattr(new, group)
+        current, fresh = getattr(scene, group), getattr(new, group)
         for name, value in values.items():
-            if getattr(own, name) == getattr(fresh, name):
-                setattr(own, name, value)
+            if getattr(current, name) == getattr(fresh, name):
+                setattr(current, name, value)
     bpy.data.scenes.remove(new)

@@ -42,8 +42,8 @@ class Ground:
 
     def __init__(self, depsgraph: Depsgraph) -> None:
         self.depsgraph = depsgraph
-        found = [o for o in depsgraph.view_layer.objects if o.type == 'MESH' and is_ground(o)]
-        self.objects = [o for o in found if len(o.evaluated_get(depsgraph).data.polygons)]
+        meshes = [o for o in depsgraph.view_layer.objects if o.type == 'MESH' and is_ground(o)]
+        self.objects = [o for o in meshes if len(o.evaluated_get(depsgraph).data.polygons)]
         places = [np.array(o.evaluated_get(depsgraph).matrix_world, dtype=np.float64) for o in self.objects]
         boxes = [np.array(o.evaluated_get(depsgraph).bound_box, dtype=np.float64) for o in self.objects]
         corners = [b @ m[:3, :3].T + m[:3, 3] for b, m in zip(boxes, places, strict=True)]
@@ -56,7 +56,7 @@ class Ground:
     def cast(self, origin: Vector, direction: Vector, distance: float = inf) -> Hit | None:
         """First place, and its normal toward the ray's origin, that a ray meets; world space, None without any."""
         direction = direction.normalized()
-        nearest, found = distance, None
+        nearest, closest = distance, None
         for obj in self._candidates(origin, direction):
             matrix = obj.evaluated_get(self.depsgraph).matrix_world
             inverse = matrix.inverted_safe()
@@ -70,8 +70,8 @@ class Ground:
             gap = (world - origin).length
             if gap <= nearest:
                 turned = (inverse.to_3x3().transposed() @ normal).normalized()
-                nearest, found = gap, (world, -turned if turned.dot(direction) > 0.0 else turned)
-        return found
+                nearest, closest = gap, (world, -turned if turned.dot(direction) > 0.0 else turned)
+        return closest
 
     def heights(self, places: Floats, above: float | Floats, below: float | Floats) -> Floats:
         """Height of the uppermost ground at places on the map.
@@ -170,12 +170,12 @@ def drop_steps(data: JobData, plants: Sequence[Object], fields: Sequence[Object]
     data.add_objects(ground.objects)
     groups = [np.array([o.matrix_world.translation for o in plants], dtype=np.float64).reshape(-1, 3)]
     groups += [positions(field) for field in fields]
-    ends = np.cumsum([len(own) for own in groups])
+    ends = np.cumsum([len(part) for part in groups])
     every = np.concatenate(groups)
     heights = yield from mapped(ground.nearest_heights(every), lambda fraction: Progress(fraction, _LOOKING))
     of_plants, *of_fields = np.split(heights, ends[:-1])
     moved = _drop_plants(view_layer, plants, of_plants)
-    moved += sum(_drop_field(field, own) for field, own in zip(fields, of_fields, strict=True))
+    moved += sum(_drop_field(field, part) for field, part in zip(fields, of_fields, strict=True))
     return DropResult(moved, int(np.isnan(heights).sum()))
 
 

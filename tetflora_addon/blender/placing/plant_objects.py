@@ -54,8 +54,8 @@ def plant_collections(scene: Scene) -> list[Collection]:
 
 def plant_collection(scene: Scene) -> Collection:
     """The scene's collection for plants; made if there is none."""
-    if found := plant_collections(scene):
-        return found[0]
+    if collections := plant_collections(scene):
+        return collections[0]
     collection = bpy.data.collections.new(COLLECTION)
     collection[_MARK] = True
     settings.begin(scene)
@@ -128,11 +128,11 @@ def _empties_steps(
     names = _numbered([known[s].name if s in known else s for s in species], rows[3])
     target = (home or plant_collection(scene)).objects
     new = bpy.data.objects.new
-    made: list = [None] * len(names)
+    empties: list = [None] * len(names)
     kinds, seeds = rows[3].tolist(), rows[4].tolist()
     # Blender keeps objects sorted by name, and is fast where one comes after the one before.
     for count, number in enumerate(sorted(range(len(names)), key=names.__getitem__), 1):
-        made[number] = obj = new(names[number], None)
+        empties[number] = obj = new(names[number], None)
         kind, group = kinds[number], obj.tetflora
         group.version, group.is_plant, group.species, group.seed = VERSION, True, species[kind], seeds[number]
         if forms[kind] is not None:
@@ -141,14 +141,14 @@ def _empties_steps(
             group.age = ages[number]
         target.link(obj)
         if not count % _BATCH:
-            yield [obj for obj in made if obj is not None]
+            yield [obj for obj in empties if obj is not None]
     heights = np.array([display_height(s) for s in species], dtype=np.float32)[rows[3]]
     for kind in range(len(species)) if ages is not None else ():
-        own = rows[3] == kind
-        heights[own] *= relative_heights(species[kind], ages[own])
-    _set_at_once(made, rows, heights)
+        of_kind = rows[3] == kind
+        heights[of_kind] *= relative_heights(species[kind], ages[of_kind])
+    _set_at_once(empties, rows, heights)
     prepare_scene(scene)
-    return made
+    return empties
 
 
 def _set_at_once(objects: Sequence[Object], rows: Sequence[np.ndarray], heights: np.ndarray) -> None:
@@ -211,9 +211,9 @@ def field_from_plants(scene: Scene, depsgraph: Depsgraph, plants: Iterable[Objec
     species = [species_of(kind) for kind in read.identifiers]
     forms = [skeleton_object_of(kind) for kind in read.identifiers]
     rows = (read.position, quaternions(read.frame), read.scale, read.species, read.seed)
-    made = link_field(scene, fields.write_field(FIELD, *rows, species, forms, fields.stored_ages(plants)), home)
+    field = link_field(scene, fields.write_field(FIELD, *rows, species, forms, fields.stored_ages(plants)), home)
     remove_plants(plants)
-    return made
+    return field
 
 
 def plants_from_field(scene: Scene, depsgraph: Depsgraph, field: Object, most: int, home: Home = None) -> list[Object]:
@@ -242,9 +242,9 @@ def plants_from_field(scene: Scene, depsgraph: Depsgraph, field: Object, most: i
     species = [species_of(kind) for kind in read.identifiers]
     forms = [skeleton_object_of(kind) for kind in read.identifiers]
     rows = (read.position, angles, read.scale, read.species, read.seed)
-    made = run_to_end(_empties_steps(scene, rows, species, forms, home, ages))
+    empties = run_to_end(_empties_steps(scene, rows, species, forms, home, ages))
     remove_fields([field])
-    return made
+    return empties
 
 
 def remove_fields(objects: Iterable[Object], tidy: bool = True) -> int:
@@ -403,7 +403,7 @@ def add_points(obj: Object, placement: Placement, species: Sequence[str]) -> Non
     turn = np.array(obj.matrix_world.to_3x3().normalized(), dtype=np.float64)
     c, s, none = np.cos(placement.azimuth), np.sin(placement.azimuth), np.zeros(len(placement))
     frame = np.stack([c, -s, none, s, c, none, none, none, none + 1.0], axis=1).reshape(-1, 3, 3)
-    own = {
+    added = {
         "position": (placement.position - world[:3, 3]) @ np.linalg.inv(world[:3, :3]).T,
         "rotation": quaternions(turn.T @ frame),
         "scale": placement.scale / size,
@@ -413,10 +413,10 @@ def add_points(obj: Object, placement: Placement, species: Sequence[str]) -> Non
     points, before = _points(obj.data), len(obj.data.vertices)
     for name, kind in {"position": 'FLOAT_VECTOR', **fields.FIELD_ATTRIBUTES}.items():
         if name not in points:  # of a mesh that never had any point, not even that
-            points[name] = (kind, np.full((before, *own[name].shape[1:]), name == "scale", KINDS[kind].dtype))
+            points[name] = (kind, np.full((before, *added[name].shape[1:]), name == "scale", KINDS[kind].dtype))
     joined: Points = {}
     for name, (kind, values) in points.items():
-        new = own.get(name, np.zeros((len(placement), *values.shape[1:])))
+        new = added.get(name, np.zeros((len(placement), *values.shape[1:])))
         joined[name] = (kind, np.concatenate([values, new.astype(values.dtype)]))
     write_points(own_mesh(obj), joined)
 
@@ -469,8 +469,8 @@ def _join_equal_kinds(obj: Object) -> None:
 
 
 def _points(mesh: Mesh) -> Points:
-    own = (one for one in mesh.attributes if one.domain == 'POINT' and not one.is_internal)
-    return {one.name: (one.data_type, values_of(one)) for one in own}
+    attributes = (one for one in mesh.attributes if one.domain == 'POINT' and not one.is_internal)
+    return {one.name: (one.data_type, values_of(one)) for one in attributes}
 
 
 def write_points(mesh: Mesh, points: Points) -> None:

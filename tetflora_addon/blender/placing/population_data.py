@@ -104,8 +104,8 @@ def fill_population(population: TetFloraLayer, entry: dict[str, Any], scene: Sce
         new = population.mix.add()
         for key, value in part.items():
             setattr(new, key, value)
-    found = (scene.objects.get(name) for name in entry.get("grounds", []))
-    set_grounds(population, [obj for obj in found if obj is not None and obj.type == 'MESH'])
+    grounds = (scene.objects.get(name) for name in entry.get("grounds", []))
+    set_grounds(population, [obj for obj in grounds if obj is not None and obj.type == 'MESH'])
 
 
 def check_value(where: str, prop: Property, value: Any) -> None:

@@ -53,8 +53,8 @@ def owner_of(scene: Scene, objects: Iterable[Object]) -> TetFloraLayer | None:
     """The population that all of these plants and fields belong to; None if there is no such one."""
     objects = set(objects)
     uids = {o.tetflora.population for o in objects}
-    found = next((p for p in scene.tetflora.layers if {p.uid} == uids), None)
-    return found if found is not None and objects <= set(own_objects(scene, found)) else None
+    owner = next((p for p in scene.tetflora.layers if {p.uid} == uids), None)
+    return owner if owner is not None and objects <= set(own_objects(scene, owner)) else None
 
 
 def adopt(scene: Scene, population: TetFloraLayer, objects: Iterable[Object]) -> None:
@@ -112,8 +112,8 @@ def make_plants_steps(data: JobData, population: TetFloraLayer, later: Sequence[
     above = (yield from canopy_steps(progress, scene, depsgraph)) if is_cover(population) else None
     yield from crown_steps(progress, scene, kinds)
     population = still_there(data, uid)
-    own = [o for o in scene.objects if later and o.tetflora.population in later] + _sorted_out(scene, population)[0]
-    search = read_search(scene, depsgraph, population, set(own), above=above)
+    present = [o for o in scene.objects if later and o.tetflora.population in later] + _sorted_out(scene, population)[0]
+    search = read_search(scene, depsgraph, population, set(present), above=above)
     stood_on = forms_of(grounds_of(scene, population), lambda obj: ground_form(obj, depsgraph))
     progress = Progress(0.1, "Looking for places")
     yield progress
@@ -124,56 +124,56 @@ def make_plants_steps(data: JobData, population: TetFloraLayer, later: Sequence[
             f"{len(placement):,} plants exceed the limit of {MOST_EMPTIES:,} empties; "
             "set Create As to Field, or use fewer plants"
         )
-    own, copies = _sorted_out(scene, population)
-    returned = max(population.made - own_number(own), 0)
+    present, copies = _sorted_out(scene, population)
+    returned = max(population.made - own_number(present), 0)
     field = makes_field(population, len(placement)) and len(placement)
-    made: list[Object] = []
+    objects: list[Object] = []
     ages = None
     if population.age > 0.0:
         ages = np.minimum(plant_ages(placement.seed, population.age, population.age_spread), np.float32(MOST_YEARS))
-    if not own and not field:  # otherwise they go first, or their successors could not have their names
-        made = yield from _new_plants(scene, placement, search.species, collection_of(scene, population), ages)
+    if not present and not field:  # otherwise they go first, or their successors could not have their names
+        objects = yield from _new_plants(scene, placement, search.species, collection_of(scene, population), ages)
     _release(copies)
-    _remove(own)
+    _remove(present)
     collection = collection_of(scene, population)
     if field:
-        made = [plant_objects.add_field(scene, placement, search.species, collection, ages)]
-        made[0].display_type = 'BOUNDS'  # its points would turn the ground black, and many take long to draw
-    elif own:
-        made = run_to_end(plant_objects.add_plants_steps(scene, placement, search.species, collection, ages))
-    for number, obj in enumerate(made):
+        objects = [plant_objects.add_field(scene, placement, search.species, collection, ages)]
+        objects[0].display_type = 'BOUNDS'  # its points would turn the ground black, and many take long to draw
+    elif present:
+        objects = run_to_end(plant_objects.add_plants_steps(scene, placement, search.species, collection, ages))
+    for number, obj in enumerate(objects):
         group = obj.tetflora
         group.population, group.population_number = population.uid, number
-    if not made:
+    if not objects:
         plant_objects.remove_empty_collections()
     population.made, population.message = len(placement), placement.reason
     population.placed_by, population.stood_on = fingerprint(population), stood_on
     returned = min(returned, len(placement))
-    return PlacedPlants(made, len(placement), placement.wanted, placement.reason, returned, placement.erased)
+    return PlacedPlants(objects, len(placement), placement.wanted, placement.reason, returned, placement.erased)
 
 
 def still_there(data: JobData, uid: str) -> TetFloraLayer:
     """A population, fetched again: adding to the list moves what is in it."""
-    found = with_identity(data.scene.tetflora.layers, uid)
-    if found is None:
+    population = with_identity(data.scene.tetflora.layers, uid)
+    if population is None:
         data.stop("its population was deleted")
         data.check()
-    return found
+    return population
 
 
 def _new_plants(
     scene: Scene, placement: Placement, species: Sequence[str], collection: Collection, ages: Floats32 | None
 ) -> Job[list[Object]]:
     """Plants where none have to go before."""
-    steps, made = plant_objects.add_plants_steps(scene, placement, species, collection, ages), []
+    steps, plants = plant_objects.add_plants_steps(scene, placement, species, collection, ages), []
     try:
         while True:
-            made = next(steps)
-            yield Progress(0.4 + 0.6 * len(made) / len(placement), f"Creating plants: {len(made):,}")
+            plants = next(steps)
+            yield Progress(0.4 + 0.6 * len(plants) / len(placement), f"Creating plants: {len(plants):,}")
     except StopIteration as stop:
         return stop.value
     except BaseException:
-        bpy.data.batch_remove([obj for obj in made if is_there(obj)])
+        bpy.data.batch_remove([obj for obj in plants if is_there(obj)])
         plant_objects.remove_empty_collections()
         raise
 
@@ -199,11 +199,11 @@ def remove_layer(scene: Scene, index: int, keep_plants: bool = False) -> int:
     group = scene.tetflora
     layer = group.layers[index]
     kept, field, number = keep_plants or layer.frozen, layer.field, 0
-    own, copies = _sorted_out(scene, layer) if layer.kind == SCATTER else ([], [])
-    _release([*own, *copies] if kept else copies)
+    present, copies = _sorted_out(scene, layer) if layer.kind == SCATTER else ([], [])
+    _release([*present, *copies] if kept else copies)
     if not kept:
-        number = own_number(own)
-        _remove(own)
+        number = own_number(present)
+        _remove(present)
         _dissolve(scene, layer.collection)
         number += plant_objects.remove_fields([field], tidy=False) if field is not None else 0
     group.layers.remove(index)
@@ -257,12 +257,12 @@ def _sorted_out(scene: Scene, population: TetFloraLayer) -> tuple[list[Object], 
     marked = [o for o in scene.objects if o.tetflora.population == uid] if uid else []
     marked = [o for o in marked if o.library is None and o.override_library is None]
     marked = [o for o in marked if o.tetflora.is_plant or o.tetflora.is_field]
-    own: dict[int, Object] = {}
+    numbered: dict[int, Object] = {}
     copies = []
     for obj in sorted(marked, key=lambda o: o.session_uid):
-        if own.setdefault(obj.tetflora.population_number, obj) is not obj:
+        if numbered.setdefault(obj.tetflora.population_number, obj) is not obj:
             copies.append(obj)
-    return [own[number] for number in sorted(own)], copies
+    return [numbered[number] for number in sorted(numbered)], copies
 
 
 def _release(objects: Iterable[Object]) -> None:
@@ -281,13 +281,13 @@ def _remove(objects: Iterable[Object]) -> None:
 
 def collection_of(scene: Scene, population: TetFloraLayer) -> Collection:
     """The collection of a population's plants, within the scene's for plants; made if there is none in the scene."""
-    found = population.collection
-    if found is None or found.library is not None or found not in set(scene.collection.children_recursive):
-        found = population.collection = bpy.data.collections.new(population.name)
-        found[plant_objects.POPULATION_MARK] = True
-        plant_objects.plant_collection(scene).children.link(found)
-    found.name = population.name
-    return found
+    holder = population.collection
+    if holder is None or holder.library is not None or holder not in set(scene.collection.children_recursive):
+        holder = population.collection = bpy.data.collections.new(population.name)
+        holder[plant_objects.POPULATION_MARK] = True
+        plant_objects.plant_collection(scene).children.link(holder)
+    holder.name = population.name
+    return holder
 
 
 def _dissolve(scene: Scene, collection: Collection | None) -> None:

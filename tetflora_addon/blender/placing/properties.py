@@ -86,8 +86,8 @@ def _companion_items(entry: "TetFloraMixEntry", _context: Context | None) -> lis
 
 
 def _choose_companion(entry: "TetFloraMixEntry", number: int) -> None:
-    found = [item[0] for item in _companion_items(entry, None) if item[4] == number]
-    entry.companion = found[0] if found and number else ""
+    chosen = [item[0] for item in _companion_items(entry, None) if item[4] == number]
+    entry.companion = chosen[0] if chosen and number else ""
 
 
 class TetFloraMixEntry(PropertyGroup, SpeciesChoice):
@@ -138,21 +138,21 @@ _OPEN = {"slope_max": pi / 2}  # values that leave everything open, where defaul
 def _limit_items(owner: PropertyGroup, _context: Context | None) -> list:
     known = owner.bl_rna.properties
     others = ('FACING', 'EDGE', 'AREAS') if getattr(owner, "kind", "") == 'BIOME' else ()
-    found = [
+    limits = [
         (key, name, f"Limit where this grows by {name.lower()}", icon, 1 << number)
         for number, (key, (name, icon, names)) in enumerate(LIMITS.items())
         if names[0] in known and key not in others
     ]
-    return _kept_items.setdefault(len(found), found)
+    return _kept_items.setdefault(len(limits), limits)
 
 
 def limits_in_use(owner: PropertyGroup) -> int:
     """Bits of `LIMITS` that are switched on, or of which something is set."""
-    known, found = owner.bl_rna.properties, owner.limits_shown
+    known, bits = owner.bl_rna.properties, owner.limits_shown
     for number, (_, _, names) in enumerate(LIMITS.values()):
         if any(name in known and _differs(getattr(owner, name), _open_value(known[name])) for name in names):
-            found |= 1 << number
-    return found
+            bits |= 1 << number
+    return bits
 
 
 def _open_value(prop: Property) -> object:
@@ -221,11 +221,11 @@ class AroundPaths:
 
 def _holders(layer: "TetFloraLayer") -> list[Collection | Object]:
     """What the plants of a layer are in: its collection or object, or those of the layers of a biome."""
-    own = [one for one in (layer.collection, layer.field) if one is not None]
+    holders = [one for one in (layer.collection, layer.field) if one is not None]
     if layer.kind == BIOME:
         parts = (part for part in layer.id_data.tetflora.layers if part.biome == layer.uid and part.kind != BIOME)
-        own += [one for part in parts for one in _holders(part)]
-    return own
+        holders += [one for part in parts for one in _holders(part)]
+    return holders
 
 
 def _is_shown(layer: "TetFloraLayer") -> bool:

@@ -76,11 +76,11 @@ def come_before(scene: Scene, biome: PropertyGroup) -> list[PropertyGroup]:
     """Biomes with limits on a shared ground to which one gives way: those above it or, if it has none itself, all."""
     if not biome.gives_way:
         return []
-    own, others = {entry.object for entry in biome.grounds}, biomes_in(scene)
+    grounds, others = {entry.object for entry in biome.grounds}, biomes_in(scene)
     if is_limited(biome):
         others = takewhile(lambda other: other.uid != biome.uid, others)
     limited = (other for other in others if other.uid != biome.uid and is_limited(other))
-    return [other for other in limited if own & {entry.object for entry in other.grounds}]
+    return [other for other in limited if grounds & {entry.object for entry in other.grounds}]
 
 
 def zone_values(scene: Scene, population: PropertyGroup) -> list[Any]:
@@ -101,9 +101,9 @@ def _read_zones(depsgraph: Depsgraph, population: PropertyGroup, grounds: Sequen
     biome = biome_of(depsgraph.scene, population)
     if biome is None:
         return ()
-    own = [_zone(biome, grounds, depsgraph)] if is_limited(biome) else []
+    zones = [_zone(biome, grounds, depsgraph)] if is_limited(biome) else []
     others = [replace(_zone(other, grounds, depsgraph), inverse=True) for other in come_before(depsgraph.scene, biome)]
-    return (*own, *others)
+    return (*zones, *others)
 
 
 def zoned(depsgraph: Depsgraph, owner: PropertyGroup, grounds: Sequence[Object], ground: Terrain) -> Terrain:
@@ -216,10 +216,10 @@ def ground_steps(scene: Scene, view_layer: ViewLayer) -> Generator[None, None, d
     seen, form = {}, cache(lambda obj: ground_form(obj, view_layer.depsgraph))
     kept = [(one.uid, rules_of(one)) for one in scene.tetflora.layers]
     read = [(uid, one.stood_on, grounds_of(scene, one), [e.object for e in one.grounds]) for uid, one in kept]
-    for uid, before, there, named in read:
-        moved, present = before and lies_elsewhere(before, forms_of(there, form)), {None, *there}
+    for uid, before, grounds, named in read:
+        moved, present = before and lies_elsewhere(before, forms_of(grounds, form)), {None, *grounds}
         missing = tuple(obj.name for obj in named if obj not in present)
-        seen[uid] = SeenGrounds(briefly(there), missing, before if moved else "")
+        seen[uid] = SeenGrounds(briefly(grounds), missing, before if moved else "")
         yield
     return seen
 
@@ -334,8 +334,8 @@ def grounds_of(scene: Scene, population: PropertyGroup) -> list[Object]:
     meshes = dict.fromkeys(o for o in named if o is not None and o.type == 'MESH' and not o.tetflora.is_field)
     # Most are seen in a view layer, which needs no look through all objects.
     seen = {o for o in meshes if any(o.visible_get(view_layer=one) for one in scene.view_layers)}
-    there = seen if len(seen) == len(meshes) else {*scene.objects}
-    return [o for o in meshes if o in there]
+    present = seen if len(seen) == len(meshes) else {*scene.objects}
+    return [o for o in meshes if o in present]
 
 
 def checked_grounds(scene: Scene, population: PropertyGroup) -> list[Object]:
@@ -376,15 +376,15 @@ class Search:
         SceneError
             Settings that leave no place.
         """
-        found = place(self.ground, self.rules, *self.present, suits=self.suits(), zones=self.zones)
-        return without(found, self.erased)
+        placement = place(self.ground, self.rules, *self.present, suits=self.suits(), zones=self.zones)
+        return without(placement, self.erased)
 
 
 def read_search(
     scene: Scene,
     depsgraph: Depsgraph,
     population: PropertyGroup,
-    own: Collection[Object],
+    ignored: Collection[Object],
     grounds: Sequence[Object] | None = None,
     most: int | None = None,
     above: Above | None = None,
@@ -393,7 +393,7 @@ def read_search(
 
     Parameters
     ----------
-    own : set of bpy.types.Object
+    ignored : set of bpy.types.Object
         Its present plants, which do not count.
     grounds : sequence of bpy.types.Object, optional
         Meshes instead of the population's own.
@@ -421,7 +421,7 @@ def read_search(
     if above is None and is_cover(population):
         above = canopy_of(scene, depsgraph)
     suits = read_suits(population, ground.triangles, species, above)
-    present = _standing(depsgraph, own, species)
+    present = _standing(depsgraph, ignored, species)
     zones = _read_zones(depsgraph, population, grounds)
     erased = (  # circles, as lines of one point
         Path(center[None], stroke[0])

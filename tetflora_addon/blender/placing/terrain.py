@@ -55,12 +55,12 @@ def ground_form(obj: Object, depsgraph: Depsgraph | None) -> str:
 def lies_elsewhere(before: str, now: str) -> bool:
     """Whether grounds lie elsewhere, or are formed otherwise, than before; no where that is not known."""
     try:
-        then, there = (np.array(text.split(), dtype=np.float64).reshape(-1, 6) for text in (before, now))
+        then, current = (np.array(text.split(), dtype=np.float64).reshape(-1, 6) for text in (before, now))
     except ValueError:
         return False
-    if len(then) != len(there) or not len(there):
-        return min(len(then), len(there)) > 0
-    return bool((np.abs(then - there) > _SAME * there[:, :1] * [np.inf, 0.0, 0.0, 1.0, 1.0, 1.0]).any())
+    if len(then) != len(current) or not len(current):
+        return min(len(then), len(current)) > 0
+    return bool((np.abs(then - current) > _SAME * current[:, :1] * [np.inf, 0.0, 0.0, 1.0, 1.0, 1.0]).any())
 
 
 @dataclass(frozen=True)
@@ -80,17 +80,17 @@ def _lines_of(obj: Object, depsgraph: Depsgraph) -> list[Line]:
     """
     evaluated, matrix, half_width = obj.evaluated_get(depsgraph), world_matrix(obj, depsgraph), 0.0
     if obj.type == 'CURVE':
-        found = _from_edges(evaluated)
-        if found is None:
-            found = [_from_spline(spline, obj) for spline in obj.data.splines]
+        splines = _from_edges(evaluated)
+        if splines is None:
+            splines = [_from_spline(spline, obj) for spline in obj.data.splines]
             half_width = obj.data.bevel_depth * float(np.linalg.norm(matrix[:3, :3], axis=0).mean())
     elif obj.type == 'CURVES':
-        found = _from_curves(evaluated.data)
+        splines = _from_curves(evaluated.data)
     else:
         return []
-    own = obj.get(HALF_WIDTH)
-    half_width = max(half_width, own) if isinstance(own, float) else half_width
-    lines = [((points @ matrix[:3, :3].T + matrix[:3, 3])[:, :2], cyclic) for points, cyclic in found if len(points)]
+    stored = obj.get(HALF_WIDTH)
+    half_width = max(half_width, stored) if isinstance(stored, float) else half_width
+    lines = [((points @ matrix[:3, :3].T + matrix[:3, 3])[:, :2], cyclic) for points, cyclic in splines if len(points)]
     if not all(np.isfinite(points).all() for points, _ in lines):
         raise SceneError(f'The curve "{obj.name}" has points that are not finite numbers; check its transform')
     return [Line(points, cyclic, half_width) for points, cyclic in lines]
@@ -205,12 +205,12 @@ def lines_within(paths: Collection, depsgraph: Depsgraph) -> tuple[Floats, ...]:
 
 def _lines(collection: Collection, depsgraph: Depsgraph, setting: str, closed: bool = False) -> list[Line]:
     """Curves of a collection, those that are closed or all of them; there is at least one."""
-    found = [line for obj in objects_within(collection) for line in _lines_of(obj, depsgraph)]
-    if not found:
+    lines = [line for obj in objects_within(collection) for line in _lines_of(obj, depsgraph)]
+    if not lines:
         raise SceneError(f'The {setting} collection "{collection.name}" has no curves; add one, or clear {setting}')
     if not closed:
-        return found
-    cyclic = [line for line in found if line.cyclic and len(line.points) > 2]
+        return lines
+    cyclic = [line for line in lines if line.cyclic and len(line.points) > 2]
     if not cyclic:
         raise SceneError(
             f'The {setting} collection "{collection.name}" has no closed curves; close one in Edit Mode with '
@@ -248,10 +248,10 @@ def _weights(evaluated: Object, mesh: Mesh, group: str, name: str) -> Floats:
     # Geometry nodes turn vertex groups into attributes.
     if attribute is not None and (attribute.domain, attribute.data_type) == ('POINT', 'FLOAT'):
         return values_of(attribute).astype(np.float64)
-    found = evaluated.vertex_groups.get(group)
-    if found is None:
+    vertex_group = evaluated.vertex_groups.get(group)
+    if vertex_group is None:
         raise SceneError(f'"{name}" has no vertex group "{group}"; add it, or clear Vertex Group')
-    index = found.index
+    index = vertex_group.index
     # Weights are lists within lists, which no foreach_get reads.
     each = (next((g.weight for g in v.groups if g.group == index), 0.0) for v in mesh.vertices)
     return np.fromiter(each, np.float64, len(mesh.vertices))
@@ -261,10 +261,10 @@ def _uv(mesh: Mesh, layer: str, name: str) -> Floats:
     """UV of each corner, (c, 2)."""
     if layer and layer not in mesh.uv_layers:
         raise SceneError(f'"{name}" has no UV map "{layer}"; add it, or clear UV Map')
-    found = mesh.uv_layers[layer] if layer else next((u for u in mesh.uv_layers if u.active_render), None)
-    if found is None:
+    uv_map = mesh.uv_layers[layer] if layer else next((u for u in mesh.uv_layers if u.active_render), None)
+    if uv_map is None:
         raise SceneError(f'"{name}" has no UV map for the image; unwrap it, or clear Image')
-    return read(mesh, found.name).astype(np.float64)
+    return read(mesh, uv_map.name).astype(np.float64)
 
 
 def _luminance(image: Image) -> Floats32:

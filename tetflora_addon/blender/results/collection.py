@@ -98,9 +98,9 @@ class Results:
         """Show what was made of a tile, in place of what the first look has of it."""
         ways = (self.tiles, self.collection, self.shown), (self.first.tiles, self.shown, self.collection)
         for tiles, before, after in ways:
-            for made in filter(is_there, tiles.pop(tile, ())):
-                after.objects.link(made)
-                before.objects.unlink(made)
+            for obj in filter(is_there, tiles.pop(tile, ())):
+                after.objects.link(obj)
+                before.objects.unlink(obj)
 
     def add(
         self,
@@ -118,12 +118,12 @@ class Results:
         self.use(materials)
         name = self.name_for(name)
         if isinstance(buffers, PointBuffers):
-            made = point_object(name, buffers, *materials)
+            obj = point_object(name, buffers, *materials)
         else:
             mesh = yield from mesh_steps(name, buffers, materials)
             self._made.append(mesh)
-            made = bpy.data.objects.new(name, mesh)
-        return self.add_object(name, made, kind, None, species, look)
+            obj = bpy.data.objects.new(name, mesh)
+        return self.add_object(name, obj, kind, None, species, look)
 
     def name_for(self, name: str) -> str:
         """A name that ends in a number, with the mark; shortened so that Blender does not cut off the end."""
@@ -137,9 +137,9 @@ class Results:
         """Look of plants of a kind, by its number; empty for others."""
         return self.looks[number] if number is not None and 0 <= number < len(self.looks) else ""
 
-    def hold(self, made: bpy.types.ID, name: str = "") -> None:
+    def hold(self, orphan: bpy.types.ID, name: str = "") -> None:
         """Take over a datablock that is in no scene, with an object's data: it goes with the results that show it."""
-        for datablock in (made, getattr(made, "data", None)):
+        for datablock in (orphan, getattr(orphan, "data", None)):
             if datablock is not None:
                 self._held.append(datablock)
                 self._names += [(datablock, name)] if name else []
@@ -157,7 +157,7 @@ class Results:
     def add_object(
         self,
         name: str,
-        made: bpy.types.Object,
+        obj: bpy.types.Object,
         kind: str,
         source: bpy.types.ID | None,
         species: Species | None = None,
@@ -175,43 +175,43 @@ class Results:
         placed : bool
             It has a transform and data of its own, which stay; otherwise it counts from the origin.
         """
-        own = [made] if placed else [made, made.data]
-        self._made += own
-        self._names += [(datablock, name) for datablock in own]
+        datablocks = [obj] if placed else [obj, obj.data]
+        self._made += datablocks
+        self._names += [(datablock, name) for datablock in datablocks]
         if self.data is not None:
-            self.data.add("a part of the result", *own)
+            self.data.add("a part of the result", *datablocks)
         if not placed:
-            made.location = self.origin
+            obj.location = self.origin
         shows = source if source is not None and is_own(source) else None
         for key, value in ((output.KIND, kind), (LIKE, look), (output.SOURCE, shows)):
             if value:
-                made[key] = value
-        for datablock in own:
+                obj[key] = value
+        for datablock in datablocks:
             tag(datablock)
             datablock.is_runtime_data = True
         if self.purpose == 'VIEW':
-            self._place(made, species)
+            self._place(obj, species)
         else:
-            self._waiting.append((made, species))
-        return made
+            self._waiting.append((obj, species))
+        return obj
 
-    def _place(self, made: bpy.types.Object, species: Species | None) -> None:
+    def _place(self, obj: bpy.types.Object, species: Species | None) -> None:
         """Add an object to the collection, as the settings have it; Blender then lists all objects anew."""
         if species is not None:
-            made.parent = output.parent_of(self.shown, species.identifier, species.name)
-            self._made.append(made.parent)
-        made.hide_select = True  # artists select and edit plants, not millions of polygons
-        output.dress(self.scene, made, "" if species is None else species.identifier)
-        self.collection.objects.link(made)
-        self.tiles.setdefault(self.tile, []).append(made)
+            obj.parent = output.parent_of(self.shown, species.identifier, species.name)
+            self._made.append(obj.parent)
+        obj.hide_select = True  # artists select and edit plants, not millions of polygons
+        output.dress(self.scene, obj, "" if species is None else species.identifier)
+        self.collection.objects.link(obj)
+        self.tiles.setdefault(self.tile, []).append(obj)
 
     def finish(self) -> None:
         """Everything is made and earlier results are gone, whose names these take.
 
         The output settings decide about the artist's results; files never hold a render's.
         """
-        for made, species in self._waiting:
-            self._place(made, species)
+        for obj, species in self._waiting:
+            self._place(obj, species)
         self._waiting.clear()
         if self.first is None:
             self.scene.collection.children.link(self.collection)
@@ -220,10 +220,10 @@ class Results:
                 self._replace(tile)
             output.remove_collection(None, self.collection)
             self.collection = self.first.collection
-        for made, name in self._names:
-            if made.name != name and is_own(made):
-                made.name = name
-                tag(made)
+        for obj, name in self._names:
+            if obj.name != name and is_own(obj):
+                obj.name = name
+                tag(obj)
         if self.purpose == 'VIEW':
             output.dress_collection(self.scene, self.collection)
         else:

@@ -74,7 +74,7 @@ def _hide_linked(scene: Scene, purpose: str, originals: Sequence[Object]) -> Non
             else:
                 excluded.add(home)
     before = {key: layer.exclude for key, layer in _layers(scene)}
-    beside = [made for home in sorted(excluded, key=lambda c: c.name_full) if (made := _beside(scene, home, wanted))]
+    beside = [copy for home in sorted(excluded, key=lambda c: c.name_full) if (copy := _beside(scene, home, wanted))]
     for entry in taken:
         entry["collection"].objects.unlink(entry["object"])
     _exclude(scene, before | {key: True for key, layer in _layers(scene) if layer.collection in excluded})
@@ -84,7 +84,7 @@ def _hide_linked(scene: Scene, purpose: str, originals: Sequence[Object]) -> Non
         "objects": [{"object": obj} for obj in wanted],
         "taken": [entry for entry in taken if entry["collection"] != scene.collection],
         "from_scene": [{"object": e["object"]} for e in taken if e["collection"] == scene.collection],
-        "beside": [{"collection": made} for made in beside],
+        "beside": [{"collection": copy} for copy in beside],
         "exclusions": json.dumps([[*key, value] for key, value in before.items() if key in paths]),
     }
 
@@ -97,9 +97,9 @@ def show_linked(scene: Scene, purpose: str) -> None:
     for entry in record["beside"]:
         if entry["collection"] is not None:
             bpy.data.collections.remove(entry["collection"])
-    there = {key: layer.exclude for key, layer in _layers(scene)}
+    exclusions = {key: layer.exclude for key, layer in _layers(scene)}
     stored = {tuple(key): value for *key, value in json.loads(record["exclusions"])}
-    _exclude(scene, there | {key: value for key, value in stored.items() if key in there})
+    _exclude(scene, exclusions | {key: value for key, value in stored.items() if key in exclusions})
     homes = [(entry["collection"], entry["object"]) for entry in record["taken"]]
     homes += [(scene.collection, entry["object"]) for entry in record["from_scene"]]
     for home, obj in homes:
@@ -142,21 +142,21 @@ def _beside(scene: Scene, home: Collection, hidden: Sequence[Object]) -> Collect
     others = [obj for obj in home.objects if obj not in hidden]
     if not others:
         return None
-    made = bpy.data.collections.new(f"{home.name} (TetFlora)")
-    tag(made)
+    copy = bpy.data.collections.new(f"{home.name} (TetFlora)")
+    tag(copy)
     for obj in others:
-        made.objects.link(obj)
-    scene.collection.children.link(made)
+        copy.objects.link(obj)
+    scene.collection.children.link(copy)
     for flag in _FLAGS:
-        setattr(made, flag, getattr(home, flag))
+        setattr(copy, flag, getattr(home, flag))
     for view_layer in scene.view_layers:
-        own = next(child for child in view_layer.layer_collection.children if child.collection == made)
+        copy_layer = next(child for child in view_layer.layer_collection.children if child.collection == copy)
         shown = [layer for (name, _), layer in _layers(scene) if name == view_layer.name and layer.collection == home]
-        own.exclude = all(layer.exclude for layer in shown)
+        copy_layer.exclude = all(layer.exclude for layer in shown)
         for layer in shown[:1]:
             for flag in _LAYER_FLAGS:
-                setattr(own, flag, getattr(layer, flag))
-    return made
+                setattr(copy_layer, flag, getattr(layer, flag))
+    return copy
 
 
 #: Custom properties of hidden objects, as JSON: hide_render and hide_viewport before ("flags"), and the names of the
@@ -223,8 +223,8 @@ def hidden_originals(scene: Scene, purpose: str | None = None) -> list[Object]:
     They may not be in the scene any more.
     """
     purposes = HIDDEN if purpose is None else [purpose]
-    own = [o for which in purposes for o in _marked(which) if _concerns(scene, o, which)]
-    return own + [o for which in purposes for o in linked_hidden(scene, which)]
+    marked = [o for which in purposes for o in _marked(which) if _concerns(scene, o, which)]
+    return marked + [o for which in purposes for o in linked_hidden(scene, which)]
 
 
 def show_originals(scene: Scene, purpose: str) -> None:

@@ -65,9 +65,9 @@ def add_instances(
 
     """
     name = results.name_for(name)
-    made = _instancer(name, source, matrices, ids)
-    look_like(made, like, results.owners.get(like))
-    return results.add_object(name, made, KIND_WHOLE, source)
+    instancer = _instancer(name, source, matrices, ids)
+    look_like(instancer, like, results.owners.get(like))
+    return results.add_object(name, instancer, KIND_WHOLE, source)
 
 
 def add_cluster_instances(
@@ -99,9 +99,9 @@ def add_cluster_instances(
     place = np.zeros(len(objects), np.int32)
     place[order] = np.arange(len(objects), dtype=np.int32)
     name = results.name_for(name)
-    made = _instancer(name, collection, matrices, ids, place[pick])
-    look_like(made, like, results.owners.get(like))
-    return results.add_object(name, made, KIND_CLUSTERS, collection)
+    instancer = _instancer(name, collection, matrices, ids, place[pick])
+    look_like(instancer, like, results.owners.get(like))
+    return results.add_object(name, instancer, KIND_CLUSTERS, collection)
 
 
 def add_cluster(results: Results, stem: str, number: int, mesh: Mesh, like: Object | None = None) -> Object:
@@ -117,10 +117,10 @@ def add_cluster(results: Results, stem: str, number: int, mesh: Mesh, like: Obje
         The object that the faces are of, whose color, pass index and the like materials may read.
     """
     name = results.name_for(f"{stem} {number:06d}")
-    made = bpy.data.objects.new(name, mesh)
-    look_like(made, like, results.owners.get(like))
-    results.hold(made, name)
-    return made
+    obj = bpy.data.objects.new(name, mesh)
+    look_like(obj, like, results.owners.get(like))
+    results.hold(obj, name)
+    return obj
 
 
 def carrier_of(results: Results, target: Any) -> Source:
@@ -133,8 +133,8 @@ def carrier_of(results: Results, target: Any) -> Source:
 
 
 def _family(results: Results, name: str, family: Sequence[tuple[Object, Any]]) -> Collection:
-    made = [_held(results, f"{name} {n}", one, np.array([at]), np.array([n])) for n, (one, at) in enumerate(family)]
-    return _collection(results, name, made)
+    held = [_held(results, f"{name} {n}", one, np.array([pose]), np.array([n])) for n, (one, pose) in enumerate(family)]
+    return _collection(results, name, held)
 
 
 def _carrier(results: Results, name: str, geometry: GeometrySet) -> Source:
@@ -152,25 +152,25 @@ def _carried(results: Results, name: str, part: ID) -> Object:
     for number, material in enumerate(data.materials):
         if material is not None and material.is_evaluated:
             data.materials[number] = material.original
-    made = bpy.data.objects.new(name, data)
-    results.hold(made, name)
-    return made
+    carrier = bpy.data.objects.new(name, data)
+    results.hold(carrier, name)
+    return carrier
 
 
 def _nested(results: Results, name: str, geometry: GeometrySet) -> list[Object]:
     """Objects that show the instances within geometry."""
-    made = []
+    held = []
     for inner, rows in references_of(geometry):
         known = isinstance(inner, Object | Collection)
         source = inner.original if known else _carrier(results, name, inner)
-        made.append(_held(results, f"{name} {len(made) + 1}", source, rows.columns.transpose(0, 2, 1), rows.number))
-    return made
+        held.append(_held(results, f"{name} {len(held) + 1}", source, rows.columns.transpose(0, 2, 1), rows.number))
+    return held
 
 
 def _held(results: Results, name: str, source: Source, matrices: NDArray[np.floating], ids: Integers) -> Object:
-    made = _instancer(own := results.name_for(name), source, matrices, ids)
-    results.hold(made, own)
-    return made
+    instancer = _instancer(full_name := results.name_for(name), source, matrices, ids)
+    results.hold(instancer, full_name)
+    return instancer
 
 
 def _instancer(name: str, source: Source, matrices: NDArray, ids: Integers, pick: Integers32 | None = None) -> Object:
@@ -185,12 +185,12 @@ def _instancer(name: str, source: Source, matrices: NDArray, ids: Integers, pick
     write(mesh, "id", np.asarray(ids, np.int32))
     if pick is not None:
         write(mesh, PICK, pick)
-    made = bpy.data.objects.new(name, mesh)
-    modifier = made.modifiers.new("Instances", 'NODES')
+    instancer = bpy.data.objects.new(name, mesh)
+    modifier = instancer.modifiers.new("Instances", 'NODES')
     modifier.node_group = group = _group(kind)
     given = next(s for s in group.interface.items_tree if s.name == _SOURCE and s.in_out == 'INPUT')
     set_node_input(modifier, given.identifier, source)
-    return made
+    return instancer
 
 
 def _group(kind: str) -> NodeTree:
@@ -224,15 +224,15 @@ def _group(kind: str) -> NodeTree:
 
 def _collection(results: Results, name: str, objects: Sequence[Object]) -> Collection:
     """A collection in no scene; the dot keeps it out of menus."""
-    made = bpy.data.collections.new(f".TetFlora {name}")
-    results.hold(made)
+    collection = bpy.data.collections.new(f".TetFlora {name}")
+    results.hold(collection)
 
     def link() -> None:
         for obj in objects:
-            made.objects.link(obj)
+            collection.objects.link(obj)
 
     in_main_thread(link)
-    return made
+    return collection
 
 
 _BARE_VERSION = 1
@@ -258,33 +258,33 @@ def add_stand_in(results: Results, name: str, original: Object, depsgraph: Depsg
         mesh = bpy.data.meshes.new_from_object(evaluated, preserve_all_data_layers=True, depsgraph=depsgraph)
         mesh.name = name
         results.hold(mesh, name)
-        made = bpy.data.objects.new(name, mesh)
-        made.matrix_world = evaluated.matrix_world
+        stand_in = bpy.data.objects.new(name, mesh)
+        stand_in.matrix_world = evaluated.matrix_world
         for number, slot in enumerate(original.material_slots):
             if slot.link == 'OBJECT':
-                made.material_slots[number].link = 'OBJECT'
-                made.material_slots[number].material = slot.material
+                stand_in.material_slots[number].link = 'OBJECT'
+                stand_in.material_slots[number].material = slot.material
     else:
-        made = original.copy()
-        made.name = name
+        stand_in = original.copy()
+        stand_in.name = name
         flags = artists_flags(original)
         for key in HIDDEN.values():  # it was never hidden
-            made.pop(key, None)
-        made.hide_render, made.hide_viewport = flags
+            stand_in.pop(key, None)
+        stand_in.hide_render, stand_in.hide_viewport = flags
         for switch in _TURNED_OFF:
-            if getattr(made.tetflora, switch, False):
-                setattr(made.tetflora, switch, False)
-        made.instance_type = 'NONE'
-        for modifier in list(made.modifiers):
+            if getattr(stand_in.tetflora, switch, False):
+                setattr(stand_in.tetflora, switch, False)
+        stand_in.instance_type = 'NONE'
+        for modifier in list(stand_in.modifiers):
             if modifier.type == 'PARTICLE_SYSTEM' and modifier.particle_system.settings.render_type in _INSTANCED:
-                made.modifiers.remove(modifier)
-        nodes = [n for n, modifier in enumerate(made.modifiers) if modifier.type == 'NODES']
+                stand_in.modifiers.remove(modifier)
+        nodes = [n for n, modifier in enumerate(stand_in.modifiers) if modifier.type == 'NODES']
         if nodes:
-            made.modifiers.new("Without Instances", 'NODES').node_group = _bare_group()
+            stand_in.modifiers.new("Without Instances", 'NODES').node_group = _bare_group()
             # Not at the end: adaptive subdivision has to be the last one.
-            made.modifiers.move(len(made.modifiers) - 1, nodes[-1] + 1)
-    look_like(made, original, results.owners.get(original))
-    return results.add_object(name, made, STAND_IN, None, placed=True)
+            stand_in.modifiers.move(len(stand_in.modifiers) - 1, nodes[-1] + 1)
+    look_like(stand_in, original, results.owners.get(original))
+    return results.add_object(name, stand_in, STAND_IN, None, placed=True)
 
 
 def shows_itself(original: Object, depsgraph: Depsgraph) -> bool:

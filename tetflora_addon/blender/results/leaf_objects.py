@@ -154,13 +154,13 @@ def resolved_species(scene: bpy.types.Scene, kind_of_plant: str, depsgraph: bpy.
 
 
 def _named(species: Species, form: str, depsgraph: bpy.types.Depsgraph, kind: str) -> LeafModel:
-    found = bpy.data.objects.get(form)
-    if found is None:
+    obj = bpy.data.objects.get(form)
+    if obj is None:
         raise SpeciesError(
             f'Species "{species.name}" uses the object "{form}" as its {kind}, but this file has no such object. '
             "Add a mesh object with this name, or choose one under Leaf Objects"
         )
-    return _model_of(species, found, depsgraph, kind)
+    return _model_of(species, obj, depsgraph, kind)
 
 
 def _model_of(species: Species, source: bpy.types.Object, depsgraph: bpy.types.Depsgraph, kind: str) -> LeafModel:
@@ -195,8 +195,8 @@ def materials_of(scene: bpy.types.Scene, species: Species, kind: str, form: int)
     if kind == "bark":
         dead = species.aged is not None and species.bark != species.aged[0].bark
         return [_in_viewports(bark_material(species.name + " dead" * dead, species.bark), species, kind)]
-    own = _brought(scene, species.identifier, kind, form)
-    return own if any(own) else [_in_viewports(_species_leaf_material(species, kind), species, kind)]
+    materials = _brought(scene, species.identifier, kind, form)
+    return materials if any(materials) else [_in_viewports(_species_leaf_material(species, kind), species, kind)]
 
 
 def brought_materials(scene: bpy.types.Scene, kind_of_plant: str) -> list[list[str]]:

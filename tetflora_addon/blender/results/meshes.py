@@ -164,10 +164,10 @@ def point_object(name: str, buffers: PointBuffers, material: bpy.types.Material)
             write(data, key, array)
         data.update_tag()
         data.materials.append(material)
-    made = bpy.data.objects.new(name, data)
+    obj = bpy.data.objects.new(name, data)
     if by_nodes:
-        made.modifiers.new("Spheres", 'NODES').node_group = spheres_group(material)
-    return made
+        obj.modifiers.new("Spheres", 'NODES').node_group = spheres_group(material)
+    return obj
 
 
 def spheres_group(material: bpy.types.Material) -> bpy.types.NodeTree:
@@ -313,12 +313,12 @@ class _Piece:
         if layer is None:
             return empty(KINDS[data_type], len(index[domain]))
         if layer.domain == domain:
-            found = layer.values[index[domain]]
+            values = layer.values[index[domain]]
         elif layer.domain == 'POINT':
-            found = layer.values[self.vertex[self.corner_verts]]
+            values = layer.values[self.vertex[self.corner_verts]]
         elif layer.domain == 'FACE':
-            found = np.repeat(layer.values[self.face], self.sizes, axis=0)
-        return found if layer.data_type == data_type else _converted(found, layer.data_type, data_type)
+            values = np.repeat(layer.values[self.face], self.sizes, axis=0)
+        return values if layer.data_type == data_type else _converted(values, layer.data_type, data_type)
 
 
 def cluster_mesh_steps(

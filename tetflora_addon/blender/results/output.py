@@ -58,40 +58,40 @@ def replaced_material(scene: bpy.types.Scene, identifier: str, kind: str) -> bpy
     return getattr(entry, kind) if entry is not None and kind in REPLACED else None
 
 
-def dress(scene: bpy.types.Scene, made: bpy.types.Object, identifier: str) -> None:
+def dress(scene: bpy.types.Scene, obj: bpy.types.Object, identifier: str) -> None:
     """Apply a scene's output settings to a result object; ``identifier`` is empty where species are mixed."""
-    if made.get(KIND) == STAND_IN:
+    if obj.get(KIND) == STAND_IN:
         return
-    output, entry, look = scene.tetflora.output, entry_of(scene, identifier), wear(made)
+    output, entry, look = scene.tetflora.output, entry_of(scene, identifier), wear(obj)
     for name in SWITCHES:
         shown = getattr(output, name) and name not in look.get("off", ())
-        if getattr(made, f"visible_{name}") != shown:  # after each, Blender lists all objects anew
-            setattr(made, f"visible_{name}", shown)
-    own = output if entry is None else entry
+        if getattr(obj, f"visible_{name}") != shown:  # after each, Blender lists all objects anew
+            setattr(obj, f"visible_{name}", shown)
+    settings = output if entry is None else entry
     if "pass_index" not in look:
-        made.pass_index = own.pass_index
+        obj.pass_index = settings.pass_index
     if "lightgroup" not in look:
-        made.lightgroup = own.light_group or output.light_group
-    made[SPECIES] = identifier
-    first = made.material_slots[0].material if made.material_slots else None
-    made[MATERIAL] = first.name if first is not None else ""
+        obj.lightgroup = settings.light_group or output.light_group
+    obj[SPECIES] = identifier
+    first = obj.material_slots[0].material if obj.material_slots else None
+    obj[MATERIAL] = first.name if first is not None else ""
 
 
 def parent_of(collection: bpy.types.Collection, identifier: str, name: str) -> bpy.types.Object:
     """The parent of a species' results, in a result collection; one for all of the file."""
     # Search all objects of the file only once for a collection: there may be hundreds of thousands.
     every = chain(collection.objects, bpy.data.objects)
-    found = next((o for o in every if o.get(KIND) == PARENT and o.get(SPECIES) == identifier and is_own(o)), None)
-    if found is None:
-        found = bpy.data.objects.new(f"{name} (TetFlora)", None)
-        found.empty_display_size = 0.0
-        found.hide_select = True
-        found[KIND], found[SPECIES] = PARENT, identifier
-        tag(found)
-        found.is_runtime_data = True
-    if found.name not in collection.objects:
-        collection.objects.link(found)
-    return found
+    parent = next((o for o in every if o.get(KIND) == PARENT and o.get(SPECIES) == identifier and is_own(o)), None)
+    if parent is None:
+        parent = bpy.data.objects.new(f"{name} (TetFlora)", None)
+        parent.empty_display_size = 0.0
+        parent.hide_select = True
+        parent[KIND], parent[SPECIES] = PARENT, identifier
+        tag(parent)
+        parent.is_runtime_data = True
+    if parent.name not in collection.objects:
+        collection.objects.link(parent)
+    return parent
 
 
 def dress_collection(scene: bpy.types.Scene, collection: bpy.types.Collection) -> None:
@@ -121,13 +121,13 @@ def mark_runtime(collection: bpy.types.Collection, runtime: bool) -> None:
 
 def _reached(datablocks: Iterable[bpy.types.ID | None]) -> list[bpy.types.ID]:
     """Those of some datablocks that TetFlora made in this file, and of what they use, each once."""
-    found: dict[bpy.types.ID, None] = {}
+    reached: dict[bpy.types.ID, None] = {}
     waiting = list(datablocks)
     while waiting:
         one = waiting.pop()
-        if one is None or one in found or not is_own(one):
+        if one is None or one in reached or not is_own(one):
             continue
-        found[one] = None
+        reached[one] = None
         waiting += getattr(one, "materials", ())
         if isinstance(one, bpy.types.Object):
             waiting += [one.data, one.get(SOURCE), *(m.node_group for m in one.modifiers if m.type == 'NODES')]
@@ -135,7 +135,7 @@ def _reached(datablocks: Iterable[bpy.types.ID | None]) -> list[bpy.types.ID]:
             waiting += one.objects
         tree = one if isinstance(one, bpy.types.NodeTree) else getattr(one, "node_tree", None)
         waiting += [node.node_tree for node in tree.nodes if node.type == 'GROUP'] if tree is not None else ()
-    return list(found)
+    return list(reached)
 
 
 def sources_of(objects: Iterable[bpy.types.Object]) -> list[bpy.types.ID]:
@@ -223,7 +223,7 @@ def remove_collection(scene: bpy.types.Scene | None, collection: bpy.types.Colle
     The artist's own objects in it stay in the scene, if that is there.
     """
     objects = list(collection.objects)
-    own = [o for o in objects if is_own(o) and not (o.get(KIND) == PARENT and len(o.users_collection) > 1)]
+    ours = [o for o in objects if is_own(o) and not (o.get(KIND) == PARENT and len(o.users_collection) > 1)]
     if scene is not None:
         for theirs in objects:
             if not is_own(theirs) and theirs.name not in scene.collection.objects:
@@ -231,10 +231,10 @@ def remove_collection(scene: bpy.types.Scene | None, collection: bpy.types.Colle
         for child in list(collection.children):
             if child.name not in scene.collection.children:
                 scene.collection.children.link(child)
-    used = _reached(own)
+    used = _reached(ours)
     release_copies(collection)
-    bpy.data.batch_remove([*own, collection])
-    return len(own) + 1 + remove_unused(used)
+    bpy.data.batch_remove([*ours, collection])
+    return len(ours) + 1 + remove_unused(used)
 
 
 def remove_unused(datablocks: Iterable[bpy.types.ID]) -> int:
@@ -249,9 +249,9 @@ def remove_unused(datablocks: Iterable[bpy.types.ID]) -> int:
 
 def remove_made(datablocks: Iterable[bpy.types.ID]) -> None:
     """Remove objects that are in no collection, and what of TetFlora's nothing uses then; and meshes without a mark."""
-    there = [datablock for datablock in dict.fromkeys(datablocks) if is_there(datablock)]
-    used = _reached(there)
+    existing = [datablock for datablock in dict.fromkeys(datablocks) if is_there(datablock)]
+    used = _reached(existing)
     bpy.data.batch_remove([d for d in used if isinstance(d, bpy.types.Object) and not d.users_collection])
-    data = [d for d in there if is_there(d) and isinstance(d, bpy.types.Mesh | bpy.types.PointCloud) and not d.users]
+    data = [d for d in existing if is_there(d) and isinstance(d, bpy.types.Mesh | bpy.types.PointCloud) and not d.users]
     bpy.data.batch_remove(data)
     remove_unused(used)

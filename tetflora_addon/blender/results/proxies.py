@@ -39,10 +39,10 @@ class Baking:
         self.first_facet = 0  # number of the first sheet that stands for a proxy
         self._meshes: list[tuple[bpy.types.Object, int]] = []
 
-    def add(self, made: bpy.types.Object, buffers: MeshBuffers, lit: bool) -> None:
+    def add(self, obj: bpy.types.Object, buffers: MeshBuffers, lit: bool) -> None:
         """A mesh of the results; ``lit`` if it gets baked light when leaves do."""
         if lit and self.leaves:
-            self._meshes.append((made, len(self.sheets)))
+            self._meshes.append((obj, len(self.sheets)))
         self.sheets.add_faces(buffers.positions, buffers.corner_verts, buffers.face_offsets)
         self.first_facet = len(self.sheets)
 
@@ -65,12 +65,12 @@ class Baking:
 
     def light_meshes(self) -> Generator[float | None, None, None]:
         """Write the light of meshes; yields the fraction that is done, and None while a thread computes."""
-        for number, (made, first) in enumerate(self._meshes):
-            mesh = made.data
+        for number, (obj, first) in enumerate(self._meshes):
+            mesh = obj.data
             stored = [read(mesh, name) for name in ("position", ".corner_vert", "tf_color", "tf_transmission")]
-            given = self.light, first, made[KIND] == "bark", face_offsets(mesh), *stored
-            found = yield from in_thread(calling(_light_of_mesh, *given))
-            for name, (domain, values) in found.items():
+            given = self.light, first, obj[KIND] == "bark", face_offsets(mesh), *stored
+            attributes = yield from in_thread(calling(_light_of_mesh, *given))
+            for name, (domain, values) in attributes.items():
                 write(mesh, name, values, domain)
             yield (number + 1) / len(self._meshes)
 
@@ -122,8 +122,8 @@ def proxy_writer(
             )
             material = kinds[isinstance(buffers, PointBuffers)]()
             set_sockets(material, results.scene, form.sockets)
-        own = number if results.tile is None else results.tile
-        name = f"{'TetFlora' if species is None else species.name} proxies {own:03d}"
+        suffix = number if results.tile is None else results.tile
+        name = f"{'TetFlora' if species is None else species.name} proxies {suffix:03d}"
         yield from results.add(name, "proxy", buffers, [material], species, look)
         statistics.polygons_proxy += buffers.polygons
         statistics.memory_mb += buffers.nbytes / 1e6

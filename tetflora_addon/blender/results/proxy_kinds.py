@@ -27,7 +27,7 @@ _SETTINGS = ("transparent_max_bounces", "min_transparent_bounces")
 _OCCLUSION = ("use_raytracing", "use_fast_gi")
 
 _Material = Callable[[], bpy.types.Material]
-_ASSET_FACETS, _ASSET_SPHERES = partial(proxy_material, own=True), partial(sphere_material, own=True)
+_ASSET_FACETS, _ASSET_SPHERES = partial(proxy_material, asset=True), partial(sphere_material, asset=True)
 
 
 @dataclass(frozen=True)

@@ -41,25 +41,25 @@ def stage_text(scene: Scene, identifier: str, age: float) -> str:
     """The stage of life that plants of a species are in at an age and the scene's years, for panels; empty for none."""
     try:
         species, years = species_for(scene, identifier), age + years_of(scene)
-        found = stage(species, years).capitalize() if years > 0.0 else FULL_GROWN
+        text = stage(species, years).capitalize() if years > 0.0 else FULL_GROWN
     except SpeciesError:
         return ""
-    return iface(found)
+    return iface(text)
 
 
 def classed(scene: Scene, parts: Sequence[Part], depsgraph: Depsgraph | None = None) -> list[tuple[str, Seeds]]:
     """Plants whose kinds name the ages that their species is to be compiled for; recorded sizes need a depsgraph."""
     find = partial(drawn_species, scene, depsgraph=depsgraph)
-    found = [(name, *sized(*of_plants, find)) for name, *of_plants in parts]
-    if all(ages is None for _, _, ages in found):
-        return [(name, seeds) for name, seeds, _ in found]
+    aged = [(name, *sized(*of_plants, find)) for name, *of_plants in parts]
+    if all(ages is None for _, _, ages in aged):
+        return [(name, seeds) for name, seeds, _ in aged]
     different: dict[str, set[float]] = {}
-    for _, seeds, ages in found:
+    for _, seeds, ages in aged:
         for number, kind in enumerate(seeds.identifiers if ages is not None else ()):
-            some = np.unique(ages[seeds.species == number])[: MOST + 2]
-            different.setdefault(species_of(kind), set()).update(some.tolist())
+            years = np.unique(ages[seeds.species == number])[: MOST + 2]
+            different.setdefault(species_of(kind), set()).update(years.tolist())
     many = {species for species, ages in different.items() if len(ages - {0.0}) > MOST}
-    return [(name, seeds if ages is None else _classed(scene, seeds, ages, many)) for name, seeds, ages in found]
+    return [(name, seeds if ages is None else _classed(scene, seeds, ages, many)) for name, seeds, ages in aged]
 
 
 def drawn_species(scene: Scene, kind: str, depsgraph: Depsgraph) -> Species:
@@ -104,23 +104,23 @@ def plainly_aged(
                 species = species_for(scene, kind.species)
                 years[index] = ages_of(species).lifespan + kind.dead
                 smaller[index] = np.divide(*heights(species, np.array([kind.age, years[index]])))
-    found = years[seeds.species] + (0.0 if ages is None else ages)
+    all_ages = years[seeds.species] + (0.0 if ages is None else ages)
     if seeds.crown is not None:
         close = np.array([kind.crowded for kind in kinds])[seeds.species]
         crown = seeds.crown.copy()
         crown[close, WIDTH] *= 1.0 - NARROWER
         seeds = replace(seeds, crown=crown)
     plain = tuple(str(kind.plain) for kind in kinds)
-    return replace(seeds, identifiers=plain, scale=seeds.scale * smaller[seeds.species]), found
+    return replace(seeds, identifiers=plain, scale=seeds.scale * smaller[seeds.species]), all_ages
 
 
 def relative_heights(identifier: str, years: NDArray[np.floating]) -> Floats:
     """Heights (n,) of plants of a species at ages (n,) over that of the description, for what stands for them."""
     try:
-        found = heights(species_for(None, identifier), years)
+        ratios = heights(species_for(None, identifier), years)
     except SpeciesError:
         return np.ones(len(years))
-    return np.where(years > 0.0, found, 1.0)
+    return np.where(years > 0.0, ratios, 1.0)
 
 
 def kind_species(species: Species, kind: str, years: float = 0.0) -> Species:
@@ -163,14 +163,14 @@ def crown_kinds(
 
 def _by_age(kinds: Sequence[str], number: Integers, ages: Floats) -> tuple[tuple[str, ...], Integers32]:
     """Kinds with their ages, and the number (n,) of each plant's, from those without (n,)."""
-    found: list[str] = []
+    aged: list[str] = []
     out = np.zeros(len(number), np.int32)
     for old, kind in enumerate(kinds):
-        own = np.flatnonzero(number == old)
-        different, which = np.unique(ages[own], return_inverse=True)
-        out[own] = which.reshape(-1) + len(found)
-        found += [str(Kind.read(kind).aged(age)) for age in different.tolist()]
-    return tuple(found), out
+        plants = np.flatnonzero(number == old)
+        different, which = np.unique(ages[plants], return_inverse=True)
+        out[plants] = which.reshape(-1) + len(aged)
+        aged += [str(Kind.read(kind).aged(age)) for age in different.tolist()]
+    return tuple(aged), out
 
 
 def _in_classes(
@@ -182,9 +182,9 @@ def _in_classes(
     """
     classes, taller = ages.copy(), np.ones(len(number))
     for index in which:
-        own = np.flatnonzero((number == index) & (ages > 0.0))
+        plants = np.flatnonzero((number == index) & (ages > 0.0))
         with suppress(SpeciesError):
             species = species_for(scene, species_of(kinds[index]))
-            classes[own] = class_ages(species, ages[own])
-            taller[own] = heights(species, ages[own] + years) / heights(species, classes[own] + years)
+            classes[plants] = class_ages(species, ages[plants])
+            taller[plants] = heights(species, ages[plants] + years) / heights(species, classes[plants] + years)
     return classes, np.maximum(taller, 1e-3)

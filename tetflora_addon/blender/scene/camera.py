@@ -181,12 +181,12 @@ def _while_open(
     def look() -> Camera | None:
         return _placed(camera, world_matrix(scene.camera, depsgraph).astype(np.float64), window)
 
-    found = [other for other in at_moments(depsgraph, [scene.camera], frames, look) if other is not None]
+    cameras = [other for other in at_moments(depsgraph, [scene.camera], frames, look) if other is not None]
     moving = any(
         not (np.allclose(o.position, camera.position, atol=1e-6) and np.allclose(o.frame, camera.frame, atol=1e-7))
-        for o in found
+        for o in cameras
     )
-    return tuple(found) if moving else ()
+    return tuple(cameras) if moving else ()
 
 
 def _stereo_views(scene: Scene, camera: Camera, depsgraph: Depsgraph) -> tuple[Camera, ...]:
@@ -203,7 +203,7 @@ def _stereo_views(scene: Scene, camera: Camera, depsgraph: Depsgraph) -> tuple[C
         return _by_suffix(scene, camera, depsgraph)
     stereo = scene.camera.data.stereo
     eyes = {'CENTER': (-0.5, 0.5), 'LEFT': (0.0, 1.0), 'RIGHT': (-1.0, 0.0)}[stereo.pivot]
-    found = []
+    cameras = []
     for side in (eye * stereo.interocular_distance for eye in eyes):
         if side == 0.0:
             continue
@@ -217,8 +217,8 @@ def _stereo_views(scene: Scene, camera: Camera, depsgraph: Depsgraph) -> tuple[C
             angle = math.atan2(side, away)
             c, s = math.cos(angle), math.sin(angle)
             moved = replace(moved, frame=camera.frame @ np.array([[c, 0.0, s], [0.0, 1.0, 0.0], [-s, 0.0, c]]))
-        found.append(moved)
-    return tuple(found)
+        cameras.append(moved)
+    return tuple(cameras)
 
 
 def _by_suffix(scene: Scene, camera: Camera, depsgraph: Depsgraph) -> tuple[Camera, ...]:
@@ -228,14 +228,14 @@ def _by_suffix(scene: Scene, camera: Camera, depsgraph: Depsgraph) -> tuple[Came
     base = next((name.removesuffix(s) for s in suffixes if name.endswith(s)), None)
     if base is None:
         return ()
-    found = []
+    cameras = []
     for other in (scene.objects.get(base + suffix) for suffix in suffixes):
         if other is None or other.type != 'CAMERA' or other == scene.camera:
             continue
         matrix = world_matrix(other, depsgraph).astype(np.float64)
         if (placed := _placed(camera, matrix)) is not None:
-            found.append(replace(placed, window=camera.window))
-    return tuple(found)
+            cameras.append(replace(placed, window=camera.window))
+    return tuple(cameras)
 
 
 #: Depths, of the far clipping depth, from which on an orthographic view shows things.
@@ -273,22 +273,22 @@ def viewport_of(scene: Scene) -> tuple[SpaceView3D, Region] | None:
 
     None where that one looks through the camera, or where there is no window.
     """
-    found = []
+    candidates = []
     for space, area in viewports(scene):
         region = next((r for r in area.regions if r.type == 'WINDOW'), None)
         if region is not None and min(region.width, region.height) > 1:
-            own = space.region_3d.view_perspective != 'CAMERA'
-            found.append(((space.shading.type == 'RENDERED', own, region.width * region.height), space, region))
-    best = max(found, key=lambda one: one[0], default=None)
+            free = space.region_3d.view_perspective != 'CAMERA'
+            candidates.append(((space.shading.type == 'RENDERED', free, region.width * region.height), space, region))
+    best = max(candidates, key=lambda one: one[0], default=None)
     return None if best is None or not best[0][1] else best[1:]
 
 
 def view_camera(scene: Scene) -> Camera | None:
     """The view of the viewport that `viewport_of` finds; None where there is none."""
-    found = viewport_of(scene)
-    if found is None:
+    viewport = viewport_of(scene)
+    if viewport is None:
         return None
-    space, region = found
+    space, region = viewport
     view, projection = (np.array(m, np.float64) for m in (space.region_3d.view_matrix, space.region_3d.window_matrix))
     return _camera_of(view, projection, (space.clip_start, space.clip_end), (region.width, region.height))
 

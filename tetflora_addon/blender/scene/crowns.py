@@ -33,9 +33,9 @@ _prepared: set[Species] = set()
 
 def crown_for(scene: bpy.types.Scene, kind: str) -> Crown:
     """The mean crown of a species at the age of a kind; a guess where it cannot be compiled."""
-    found = _found(scene, kind)
+    species = _found(scene, kind)
     try:
-        return crown_of(found) if isinstance(found, Species) else found
+        return crown_of(species) if isinstance(species, Species) else species
     except SpeciesError:  # with an object for a leaf
         return _guess(species_of(kind))
 

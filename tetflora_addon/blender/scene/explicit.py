@@ -53,7 +53,7 @@ def read_explicit(depsgraph: bpy.types.Depsgraph) -> Explicit | None:
     wanted = marked | _instancers_of_marked(rendered, depsgraph)
     if not wanted:
         return None
-    reader, looks, found = _Reader(), LayerLooks(depsgraph.view_layer), set()
+    reader, looks, owners = _Reader(), LayerLooks(depsgraph.view_layer), set()
     for instance in depsgraph.object_instances:
         owner = instance.parent.original if instance.is_instance else instance.object.original
         if owner not in wanted or not instance.show_self or instance.object.type not in SURFACE_TYPES:
@@ -62,18 +62,18 @@ def read_explicit(depsgraph: bpy.types.Depsgraph) -> Explicit | None:
             continue
         look = looks.of(instance.object.original, owner if instance.is_instance else None, model=True)
         if reader.add(instance.object, np.array(instance.matrix_world, dtype=np.float64), look):
-            found.add(owner)
+            owners.add(owner)
     # Objects whose eye is closed are listed nowhere; what a collection disables in viewports comes without modifiers.
-    for obj in sorted(marked - found, key=lambda o: o.name_full):
+    for obj in sorted(marked - owners, key=lambda o: o.name_full):
         unseen = obj.type in SURFACE_TYPES and not obj.visible_get(view_layer=depsgraph.view_layer)
         if unseen and reader.add(obj.evaluated_get(depsgraph), world_matrix(obj, depsgraph), looks.of(obj, model=True)):
-            found.add(obj)
+            owners.add(obj)
         else:
             raise SceneError(
                 f'"{obj.name}" has no faces to refine; add faces, or turn off Refine This Mesh in the TetFlora '
                 "tab of the sidebar"
             )
-    for obj in sorted(found, key=lambda o: o.name_full):
+    for obj in sorted(owners, key=lambda o: o.name_full):
         if obj.library is not None:
             raise SceneError(
                 f'"{obj.name}" is linked, so it cannot be hidden while results replace it; choose '
@@ -83,7 +83,7 @@ def read_explicit(depsgraph: bpy.types.Depsgraph) -> Explicit | None:
         meshes = Meshes(reader.surfaces, np.array(reader.surface), np.array(reader.matrices))
     except ValueError as error:
         raise SceneError(str(error)) from error
-    return Explicit(meshes, reader.materials, sorted(found, key=lambda o: o.name_full))
+    return Explicit(meshes, reader.materials, sorted(owners, key=lambda o: o.name_full))
 
 
 def _instancers_of_marked(rendered: set[bpy.types.Object], depsgraph: bpy.types.Depsgraph) -> set[bpy.types.Object]:
@@ -119,8 +119,8 @@ class _Reader:
 
     def add(self, obj: bpy.types.Object, matrix: Floats, look: str) -> bool:
         """Take an evaluated object, or an original that is not evaluated; False if it has no faces."""
-        own = tuple(slot.material.name_full for slot in obj.material_slots if slot.link == 'OBJECT' and slot.material)
-        key = obj.data.as_pointer(), obj.type, own, obj.original.as_pointer() if obj.type != 'MESH' else 0, look
+        names = tuple(slot.material.name_full for slot in obj.material_slots if slot.link == 'OBJECT' and slot.material)
+        key = obj.data.as_pointer(), obj.type, names, obj.original.as_pointer() if obj.type != 'MESH' else 0, look
         if key not in self._known:
             self._known[key] = self._read(obj, look)
         number = self._known[key]

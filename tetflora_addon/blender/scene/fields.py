@@ -150,14 +150,14 @@ def point_count(points: Points) -> int:
 def _attribute(obj: Object, points: Points, name: str, kinds: Iterable[str]) -> Attribute | None:
     """An attribute, or the one that overrides it."""
     attributes, ours = points.attributes, name.startswith(PREFIX)
-    found = attributes.get(name) if ours else attributes.get(PREFIX + name) or attributes.get(name)
-    if found is not None and (found.domain != 'POINT' or found.data_type not in kinds):
+    stored = attributes.get(name) if ours else attributes.get(PREFIX + name) or attributes.get(name)
+    if stored is not None and (stored.domain != 'POINT' or stored.data_type not in kinds):
         raise SceneError(
-            f'"{obj.name}": attribute "{found.name}" is {found.data_type} on {found.domain}; a field requires '
+            f'"{obj.name}": attribute "{stored.name}" is {stored.data_type} on {stored.domain}; a field requires '
             f"{' or '.join(sorted(kinds))} on POINT. "
             + ("Convert or rename it" if ours else f"Convert it, or store the values as {PREFIX}{name}")
         )
-    return found
+    return stored
 
 
 def _integers(obj: Object, points: Points, name: str, size: int, default: Integers | int) -> Integers:
@@ -181,8 +181,8 @@ def _ages(obj: Object, points: Points, size: int) -> NDArray[np.floating]:
     attribute = _attribute(obj, points, AGE, {'FLOAT', 'INT'})
     if attribute is not None:
         return values_of(attribute)
-    own = stored_ages([obj])
-    return np.broadcast_to(np.zeros(1) if own is None else own, size)
+    age = stored_ages([obj])
+    return np.broadcast_to(np.zeros(1) if age is None else age, size)
 
 
 def _rotations(obj: Object, points: Points, size: int) -> Floats:
@@ -193,8 +193,8 @@ def _rotations(obj: Object, points: Points, size: int) -> Floats:
     values, out = values_of(attribute), np.empty((3, 3, size))
     turned = _from_quaternions if values.shape[1] == 4 else _from_eulers
     for first in range(0, size, _BLOCK):
-        some = slice(first, first + _BLOCK)
-        out[:, :, some] = turned(np.ascontiguousarray(values[some].T, np.float64))
+        block = slice(first, first + _BLOCK)
+        out[:, :, block] = turned(np.ascontiguousarray(values[block].T, np.float64))
     return out
 
 
@@ -244,16 +244,16 @@ def placed_frames(world: Floats, rotation: Floats, scale: Floats) -> tuple[Float
     even = np.allclose(frames * scales[:, None, None], world, rtol=0.0, atol=1e-6 * np.abs(scales).max(initial=0.0))
     if even and sound.all() and len(scale) == 1:
         # Nothing is sheared, mirrored or stretched: what comes out are rotations already.
-        linear, found = frames, (scales[:, None] * scale).reshape(-1)
+        linear, factors = frames, (scales[:, None] * scale).reshape(-1)
     else:
         # Of a scale along axes a column each; a scale alone holds for all of them.
-        linear, rotation, found = world, rotation * scale, None
+        linear, rotation, factors = world, rotation * scale, None
     if not np.array_equal(linear, np.eye(3)[None]):  # most fields stand where the world begins
         rotation = linear @ rotation.reshape(3, -1)
     turned = rotation.reshape(places, 3, 3, size).transpose(0, 3, 1, 2).reshape(-1, 3, 3)
-    if found is None:
+    if factors is None:
         return frames_of(turned)
-    return turned, found, np.isfinite(turned.sum(axis=(1, 2))) & np.isfinite(found)
+    return turned, factors, np.isfinite(turned.sum(axis=(1, 2))) & np.isfinite(factors)
 
 
 def refuse(obj: Object, bad: Mask, what: str) -> None:
@@ -286,9 +286,9 @@ class History:
         now = last if first == last else min(float(now), last)  # what has one year has no others
         plant, before = self.first, self.year <= now
         following = np.append(plant[1:] == plant[:-1], False)
-        there = before & (self.year == now)
-        between = before & following & ~there & (np.append(self.year[1:], now) > now)
-        a = np.flatnonzero(there | between)
+        exact = before & (self.year == now)
+        between = before & following & ~exact & (np.append(self.year[1:], now) > now)
+        a = np.flatnonzero(exact | between)
         b = a + between[a]
         return a, b, (now - self.year[a]) / np.maximum(self.year[b] - self.year[a], 1e-9)
 
@@ -350,7 +350,7 @@ def read_sizes(obj: Object, parts: Sequence[Points]) -> Sizes | None:
     names = (*NUMBERS, OFFSET, FIT)
     if not any(name in part.attributes for part in parts for name in names):
         return None
-    found = []
+    columns = []
     for name in names:
         values = joined([_values(obj, part, name) for part in parts], (0,) if name in NUMBERS else (0, 3))
         most = NUMBERS.get(name, _MOST_FIT if name == FIT else _MOST_OFFSET)
@@ -358,8 +358,8 @@ def read_sizes(obj: Object, parts: Sequence[Points]) -> Sizes | None:
         bad = ~((values >= least) & (values <= most))
         bad = bad.any(axis=1) if bad.ndim > 1 else bad
         refuse(obj, bad, f"{name} that is not from {least:g} to {most:,.0f}")
-        found.append(values[:, :2] if values.ndim > 1 else values)
-    *rest, fit = found
+        columns.append(values[:, :2] if values.ndim > 1 else values)
+    *rest, fit = columns
     return Sizes(*rest, np.where(fit > 0.0, fit, 1.0))  # in the order of the names
 
 
@@ -416,8 +416,8 @@ def in_year(
     columns["dead"] = np.where(sizes.dead[b] > 0.0, np.maximum(sizes.dead[b] - left, 0.0), sizes.dead[a])
     if smooth:
         columns["plant"] = records.first[a]
-        own = sizes.height, sizes.width, sizes.base, sizes.dead
-        columns["lives"] = Lives(now, records.year, *own, records.first, points.species)
+        measures = sizes.height, sizes.width, sizes.base, sizes.dead
+        columns["lives"] = Lives(now, records.year, *measures, records.first, points.species)
     return chosen, Sizes(**columns)
 
 
@@ -443,8 +443,8 @@ def _turned(rotation: NDArray, a: Integers, b: Integers, part: Floats) -> NDArra
 def _values(obj: Object, points: Points, name: str) -> Floats:
     """An attribute in double precision; 0 where it is absent."""
     size, vector = point_count(points), SIZE_ATTRIBUTES[name] == 'FLOAT_VECTOR'
-    found = _attribute(obj, points, name, {'FLOAT_VECTOR'} if vector else {'FLOAT', 'INT'})
-    return np.zeros((size, 3) if vector else size) if found is None else values_of(found).astype(np.float64)
+    attribute = _attribute(obj, points, name, {'FLOAT_VECTOR'} if vector else {'FLOAT', 'INT'})
+    return np.zeros((size, 3) if vector else size) if attribute is None else values_of(attribute).astype(np.float64)
 
 
 def field_kinds(obj: Object) -> tuple[str, ...]:
@@ -530,8 +530,8 @@ def stored_points(obj: Object, depsgraph: Depsgraph) -> dict[str, tuple[str, NDA
     if len(parts) != 1 or read_records(obj, parts) is not None:
         return {}
     names = {prefix + name for name in (*FIELD_ATTRIBUTES, "id", AGE) for prefix in ("", PREFIX)}
-    found = {a.name: a for a in parts[0].attributes if a.name in {"position", *names, *SIZE_ATTRIBUTES}}
-    return {name: (a.data_type, values_of(a)) for name, a in found.items() if a.domain == 'POINT'}
+    attributes = {a.name: a for a in parts[0].attributes if a.name in {"position", *names, *SIZE_ATTRIBUTES}}
+    return {name: (a.data_type, values_of(a)) for name, a in attributes.items() if a.domain == 'POINT'}
 
 
 def _placed_sizes(sizes: Sizes, world: Floats) -> Sizes:
@@ -570,18 +570,18 @@ def read_field_matrices(
     seeds = points.seeds(keys).reshape(-1, len(points.species))
     seeds = np.broadcast_to(seeds, (len(matrices), seeds.shape[1]))
     for number, kind in enumerate(kinds):
-        own = np.flatnonzero(points.species == number)
-        if species_of(kind) not in wanted or not len(own):
+        plants = np.flatnonzero(points.species == number)
+        if species_of(kind) not in wanted or not len(plants):
             continue
-        local = np.zeros((len(own), 4, 4))
-        stretch = points.scale[:, own] * (1.0 if sizes is None else _stretch(kind, sizes.take(own)))
-        local[:, :3, :3] = np.moveaxis(points.rotation[:, :, own] * stretch, 2, 0)
-        local[:, :3, 3], local[:, 3, 3] = points.position[own], 1.0
+        local = np.zeros((len(plants), 4, 4))
+        stretch = points.scale[:, plants] * (1.0 if sizes is None else _stretch(kind, sizes.take(plants)))
+        local[:, :3, :3] = np.moveaxis(points.rotation[:, :, plants] * stretch, 2, 0)
+        local[:, :3, 3], local[:, 3, 3] = points.position[plants], 1.0
         placed = matrices.astype(np.float64)[:, None] @ local
         bad = np.zeros(len(points.species), bool)
-        bad[own] = ~np.isfinite(placed).all(axis=(0, 2, 3))
+        bad[plants] = ~np.isfinite(placed).all(axis=(0, 2, 3))
         refuse(obj, bad, "an invalid position or rotation")
-        yield kind, seeds[:, own].reshape(-1), placed.reshape(-1, 4, 4)
+        yield kind, seeds[:, plants].reshape(-1), placed.reshape(-1, 4, 4)
 
 
 def _stretch(kind: str, sizes: Sizes) -> Floats:
@@ -647,9 +647,9 @@ def write_field(
     mesh.vertices.add(len(seed))
     origin = origin_near(position)
     write(mesh, "position", position - origin)
-    own = {"rotation": rotation, "scale": scale, "species": species, "seed": seed}
+    columns = {"rotation": rotation, "scale": scale, "species": species, "seed": seed}
     for attribute, kind in FIELD_ATTRIBUTES.items():
-        write(mesh, attribute, own[attribute], data_type=kind)
+        write(mesh, attribute, columns[attribute], data_type=kind)
     same = ages is None or np.ptp(ages) == 0.0
     if not same:
         write(mesh, AGE, ages, data_type='FLOAT')

@@ -45,7 +45,7 @@ def read_lights(depsgraph: bpy.types.Depsgraph) -> tuple[Light, ...]:
     Energies are as Cycles takes them, measured on a white plane within .1 %: a sun's is its irradiance; a point or spot
     of Φ watts sends Φ / 4π W/sr each way, an area Φ / π W/sr ahead.
     """
-    found = []
+    lights = []
     for obj in sorted(renderable_objects(depsgraph.view_layer), key=lambda o: o.name_full):
         if obj.type != 'LIGHT':
             continue
@@ -57,17 +57,17 @@ def read_lights(depsgraph: bpy.types.Depsgraph) -> tuple[Light, ...]:
             continue
         given = {"position": matrix[:3, 3], "direction": -matrix[:3, 2] / length, "shadow": bool(data.use_shadow)}
         if data.type == 'SUN':
-            found.append(Light('SUN', width=float(data.angle), color=color, **given))
+            lights.append(Light('SUN', width=float(data.angle), color=color, **given))
         elif data.type == 'AREA':
-            found.append(_area(data, matrix, color, given))
+            lights.append(_area(data, matrix, color, given))
         else:
             # Without "normalize" the energy is that of a unit surface.
             radius = data.shadow_soft_size
             surface = 1.0 if data.normalize else np.pi * radius**2
             spot = {"angle": data.spot_size / 2.0, "blend": data.spot_blend} if data.type == 'SPOT' else {}
             color = color * surface / (4.0 * np.pi)
-            found.append(Light(data.type, width=2.0 * radius, color=color, **given, **spot))
-    return tuple(found)
+            lights.append(Light(data.type, width=2.0 * radius, color=color, **given, **spot))
+    return tuple(lights)
 
 
 def _area(data: bpy.types.AreaLight, matrix: Floats, color: Floats, given: dict) -> Light:
@@ -173,8 +173,8 @@ def _image(node: bpy.types.Node, factor: float, turn: float) -> World:
         longitude = np.arctan2(toward[:, 1], toward[:, 0]) + turn
         column = (0.5 - longitude / (2.0 * np.pi)) % 1.0 * columns
         row = (0.5 + np.arcsin(np.clip(toward[:, 2], -1.0, 1.0)) / np.pi) * rows
-        at = np.minimum(row.astype(int), rows - 1), np.minimum(column.astype(int), columns - 1)
-        return pixels[at].astype(np.float64) * factor
+        texels = np.minimum(row.astype(int), rows - 1), np.minimum(column.astype(int), columns - 1)
+        return pixels[texels].astype(np.float64) * factor
 
     return World.of(radiance)
 

@@ -36,10 +36,10 @@ class LayerLooks:
     @cached_property
     def _unlike(self) -> tuple[bool, bool]:
         """Whether any collection is only indirect, or a holdout: else no object has to be asked."""
-        found = [self._layer.layer_collection]
-        for one in found:
-            found += one.children
-        return any(one.indirect_only for one in found), any(one.holdout for one in found)
+        collections = [self._layer.layer_collection]
+        for one in collections:
+            collections += one.children
+        return any(one.indirect_only for one in collections), any(one.holdout for one in collections)
 
     @cached_property
     def _shows(self) -> Callable[[bpy.types.Object], bool]:
@@ -50,27 +50,27 @@ class LayerLooks:
 
     def of(self, obj: bpy.types.Object, instancer: bpy.types.Object | None = None, model: bool = False) -> str:
         """The look of an object, or of its instances that another shows, whose collections and holdout then count."""
-        found = self._read(mover := instancer or obj)
+        look = self._read(mover := instancer or obj)
         # What moves carries its results, which are blurred with it.
         if model and self._layer.id_data.render.use_motion_blur and moves(mover):
             here = mover.evaluated_get(self._layer.depsgraph).matrix_world
-            found["carried_by"] = mover.name_full, [list(row) for row in here]
+            look["carried_by"] = mover.name_full, [list(row) for row in here]
         if instancer is not None:
             inner = _of_object(obj)
-            off = {*found.get("off", ()), *inner.pop("off", ())}
+            off = {*look.get("off", ()), *inner.pop("off", ())}
             inner.pop("is_holdout", None)
-            found = inner | {n: v for n, v in found.items() if n not in _OWN} | ({"off": sorted(off)} if off else {})
-        return json.dumps(found, sort_keys=True) if found else ""
+            look = inner | {n: v for n, v in look.items() if n not in _OWN} | ({"off": sorted(off)} if off else {})
+        return json.dumps(look, sort_keys=True) if look else ""
 
     def _read(self, obj: bpy.types.Object) -> dict[str, Any]:
-        found, (indirect, holdout) = _of_object(obj), self._unlike
+        look, (indirect, holdout) = _of_object(obj), self._unlike
         if indirect and obj.indirect_only_get(view_layer=self._layer):
-            found["off"] = sorted({*found.get("off", ()), "camera"})
+            look["off"] = sorted({*look.get("off", ()), "camera"})
         if holdout and obj.holdout_get(view_layer=self._layer):
-            found["is_holdout"] = True
+            look["is_holdout"] = True
         if self._viewports and not self._shows(obj):
-            found["hide_viewport"] = True
-        return found
+            look["hide_viewport"] = True
+        return look
 
 
 def shown_objects(layer: bpy.types.ViewLayer) -> list[bpy.types.Object]:
@@ -79,21 +79,21 @@ def shown_objects(layer: bpy.types.ViewLayer) -> list[bpy.types.Object]:
     Blender lists them five times as fast as we ask each, but not while it renders without a window.
     """
     with bpy.context.temp_override(area=None, scene=layer.id_data, view_layer=layer):
-        found = getattr(bpy.context, "visible_objects", None)
-    return [obj for obj in layer.objects if obj.visible_get(view_layer=layer)] if found is None else found
+        visible = getattr(bpy.context, "visible_objects", None)
+    return [obj for obj in layer.objects if obj.visible_get(view_layer=layer)] if visible is None else visible
 
 
 def _of_object(obj: bpy.types.Object) -> dict[str, Any]:
     """What an object says itself, but for what new objects say."""
-    found = {name: value for name in (*_FLAGS, *_OWN) if (value := getattr(obj, name))}
+    look = {name: value for name in (*_FLAGS, *_OWN) if (value := getattr(obj, name))}
     if off := [ray for ray in RAYS if not getattr(obj, f"visible_{ray}", True)]:
-        found["off"] = sorted(off)
+        look["off"] = sorted(off)
     linking = obj.light_linking
-    found |= {name: value.name_full for name in _LINKING if (value := getattr(linking, name)) is not None}
-    return found
+    look |= {name: value.name_full for name in _LINKING if (value := getattr(linking, name)) is not None}
+    return look
 
 
-def look_like(made: bpy.types.Object, like: bpy.types.Object | None, look: str | None = None) -> None:
+def look_like(result: bpy.types.Object, like: bpy.types.Object | None, look: str | None = None) -> None:
     """Give a result the look, color and settings of Cycles of an object; nothing for None.
 
     Without a look it is what the object says itself, but for viewports: what is instanced may be hidden there.
@@ -101,34 +101,34 @@ def look_like(made: bpy.types.Object, like: bpy.types.Object | None, look: str |
     """
     if like is None:
         return
-    _copy(_OTHERS, like, made)
-    own, others = getattr(made, "cycles", None), getattr(like, "cycles", None)
-    if own is not None and others is not None:
-        names = [p.identifier for p in own.bl_rna.properties if not p.is_readonly and p.identifier != "name"]
-        _copy(names, others, own)
+    _copy(_OTHERS, like, result)
+    cycles, others = getattr(result, "cycles", None), getattr(like, "cycles", None)
+    if cycles is not None and others is not None:
+        names = [p.identifier for p in cycles.bl_rna.properties if not p.is_readonly and p.identifier != "name"]
+        _copy(names, others, cycles)
     said = json.loads(look or "{}")
     if look is None:
         said = _of_object(like)
         said.pop("hide_viewport", None)
-    made[LIKE] = json.dumps({"pass_index": like.pass_index} | said)
-    wear(made)
+    result[LIKE] = json.dumps({"pass_index": like.pass_index} | said)
+    wear(result)
 
 
-def wear(made: bpy.types.Object) -> dict[str, Any]:
+def wear(result: bpy.types.Object) -> dict[str, Any]:
     """Give a result what its look says, but for what output settings have a say in; returns the look."""
-    look = json.loads(made.get(LIKE) or "{}")
+    look = json.loads(result.get(LIKE) or "{}")
     said = {name: look[name] for name in (*_FLAGS, *_OWN) if name in look}
     said |= {f"visible_{ray}": False for ray in look.get("off", ())}
     for name, value in said.items():
-        if getattr(made, name) != value:  # each change makes Blender list all objects anew
-            setattr(made, name, value)
+        if getattr(result, name) != value:  # each change makes Blender list all objects anew
+            setattr(result, name, value)
     for name in _LINKING:
-        if name in look and getattr(made.light_linking, name) is None:
-            found = next((c for c in bpy.data.collections if c.name_full == look[name]), None)
-            setattr(made.light_linking, name, found)
-    if "carried_by" in look and not made.constraints:
+        if name in look and getattr(result.light_linking, name) is None:
+            collection = next((c for c in bpy.data.collections if c.name_full == look[name]), None)
+            setattr(result.light_linking, name, collection)
+    if "carried_by" in look and not result.constraints:
         name, here = look["carried_by"]
-        carried = made.constraints.new('CHILD_OF')
+        carried = result.constraints.new('CHILD_OF')
         carried.target = next((o for o in bpy.data.objects if o.name_full == name), None)
         carried.inverse_matrix = Matrix(here).inverted_safe()
     return look

@@ -47,14 +47,14 @@ def at_moments(
 ) -> list[_Seen]:
     """What a function finds at each of some frames, where `attributes.world_matrix` tells where movers are then."""
     now, *others = in_main_thread(partial(_placed, depsgraph, movers, (depsgraph.scene.frame_current_final, *frames)))
-    back, found = np.linalg.pinv(now), []
+    back, seen = np.linalg.pinv(now), []
     try:
         for then in others:
             attributes.elsewhere = dict(zip((obj.session_uid for obj in movers), then @ back, strict=True))
-            found.append(look())
+            seen.append(look())
     finally:
         attributes.elsewhere = {}
-    return found
+    return seen
 
 
 def _placed(depsgraph: bpy.types.Depsgraph, movers: list[bpy.types.Object], frames: Iterable[float]) -> list[Floats]:
@@ -65,10 +65,10 @@ def _placed(depsgraph: bpy.types.Depsgraph, movers: list[bpy.types.Object], fram
     # What watches the scene shall not look again: nothing has changed.
     every = bpy.app.handlers
     handlers = every.depsgraph_update_pre, every.depsgraph_update_post, every.frame_change_pre, every.frame_change_post
-    kept, found = [list(some) for some in handlers], []
+    kept, matrices = [list(hooks) for hooks in handlers], []
     try:
-        for some in handlers:
-            some.clear()
+        for hooks in handlers:
+            hooks.clear()
         for child, obj in zip(children, movers, strict=True):
             scene.collection.objects.link(child)
             child.parent = obj
@@ -77,10 +77,10 @@ def _placed(depsgraph: bpy.types.Depsgraph, movers: list[bpy.types.Object], fram
             scene.frame_set(math.floor(frame), subframe=frame % 1.0)
             graph = scene.view_layers[0].depsgraph
             placed = np.array([obj.evaluated_get(graph).matrix_world for obj in movers], np.float64).reshape(-1, 4, 4)
-            found.append(np.where(np.isfinite(placed).all(axis=(1, 2), keepdims=True), placed, np.eye(4)))
+            matrices.append(np.where(np.isfinite(placed).all(axis=(1, 2), keepdims=True), placed, np.eye(4)))
     finally:
         bpy.data.batch_remove([*children, scene])
         depsgraph.update()
-        for some, functions in zip(handlers, kept, strict=True):
-            some.extend(functions)
-    return found
+        for hooks, functions in zip(handlers, kept, strict=True):
+            hooks.extend(functions)
+    return matrices

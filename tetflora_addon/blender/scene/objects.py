@@ -81,18 +81,18 @@ class Rows:
 
     def within(self, matrices: Floats, keys: Keys) -> tuple[Floats, Keys]:
         """Places (k · n, 4, 4) and keys (k · n,) of the instances in each of k places with their keys."""
-        many, own = len(matrices), len(self.number)
+        many, rows = len(matrices), len(self.number)
         names = child_key(keys[:, None], self.number).reshape(-1)
-        if own == 1 and np.array_equal(self.columns[0], np.eye(4)):  # as nodes that bring an object make it
+        if rows == 1 and np.array_equal(self.columns[0], np.eye(4)):  # as nodes that bring an object make it
             return matrices, names
         # A product of two large matrices for each of the fewer, and not one of two small ones for each of the more.
         columns = self.columns.astype(np.float64)
-        if many <= own:
+        if many <= rows:
             places = columns.reshape(-1, 4) @ matrices.transpose(0, 2, 1)
-            places = places.reshape(many, own, 4, 4).transpose(0, 1, 3, 2)
+            places = places.reshape(many, rows, 4, 4).transpose(0, 1, 3, 2)
         else:
             places = matrices.reshape(-1, 4) @ columns.transpose(0, 2, 1)
-            places = places.reshape(own, many, 4, 4).transpose(1, 0, 2, 3)
+            places = places.reshape(rows, many, 4, 4).transpose(1, 0, 2, 3)
         return np.ascontiguousarray(places).reshape(-1, 4, 4), names
 
 
@@ -101,10 +101,10 @@ def references_of(geometry: bpy.types.GeometrySet) -> Iterator[tuple[Reference, 
     points = geometry.instances_pointcloud()
     if points is None or not len(points.points):
         return
-    references, own = geometry.instance_references(), points.attributes.get("id")
+    references, ids = geometry.instance_references(), points.attributes.get("id")
     transform = read(points, "instance_transform").reshape(-1, 4, 4)
-    known = own is not None and own.data_type == 'INT'
-    number = values_of(own).astype(np.int64) if known else np.arange(len(transform))
+    known = ids is not None and ids.data_type == 'INT'
+    number = values_of(ids).astype(np.int64) if known else np.arange(len(transform))
     if len(references) == 1:
         if references[0] is not None:  # somebody has deleted it
             yield references[0], Rows(transform, number)
@@ -197,10 +197,10 @@ def takes_part(obj: bpy.types.Object) -> bool:
 def taking_part(scene: bpy.types.Scene) -> list[bpy.types.Object]:
     """Objects of a scene that refinement reads, hidden ones included: plants, meshes, assets, occluders and lamps."""
     every = objects_within(scene.collection)
-    found = [obj for obj in every if obj.type == 'LIGHT' or takes_part(obj) or obj.tetflora.is_occluder]
+    objects = [obj for obj in every if obj.type == 'LIGHT' or takes_part(obj) or obj.tetflora.is_occluder]
     for asset in asset_species(scene).values():
-        found += [asset.object] if asset.object is not None else objects_within(asset.collection)
-    return found
+        objects += [asset.object] if asset.object is not None else objects_within(asset.collection)
+    return objects
 
 
 def may_take_part(obj: bpy.types.Object) -> bool:
@@ -287,7 +287,7 @@ def copies_of(objects: Sequence[bpy.types.Object], depsgraph: bpy.types.Depsgrap
     objects : sequence of bpy.types.Object
         Original objects that render, in an order that does not change.
     """
-    found: list[Copies] = []
+    copies: list[Copies] = []
     left: set[bpy.types.Object] = set()
     alone: dict[tuple[Reference, str], list[bpy.types.Object]] = {}
     groups = alone.copy()
@@ -302,10 +302,10 @@ def copies_of(objects: Sequence[bpy.types.Object], depsgraph: bpy.types.Depsgrap
     for (shown, _), instancers in (alone | groups).items():
         matrices = np.array([world_matrix(obj, depsgraph) for obj in instancers], dtype=np.float64)
         try:
-            found += list(_within(shown, matrices, name_keys(instancers), depsgraph, instancers[0]))
+            copies += list(_within(shown, matrices, name_keys(instancers), depsgraph, instancers[0]))
         except _OneByOne:
             left.update(instancers)
-    return found + (list(_one_by_one(left, depsgraph)) if left else [])
+    return copies + (list(_one_by_one(left, depsgraph)) if left else [])
 
 
 def geometry_of(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> bpy.types.GeometrySet | None:
@@ -319,11 +319,11 @@ def geometry_of(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> bpy.ty
 
 def materials_of(obj: bpy.types.Object | None, mesh: bpy.types.Mesh) -> list[bpy.types.Material | None]:
     """Original materials of the slots of a mesh, which may be an object's; at least one slot."""
-    found = [material.original if material is not None else None for material in mesh.materials] or [None]
+    materials = [material.original if material is not None else None for material in mesh.materials] or [None]
     for i, slot in enumerate(obj.material_slots if obj is not None else ()):
-        if slot.link == 'OBJECT' and i < len(found):
-            found[i] = slot.material.original if slot.material else None
-    return found
+        if slot.link == 'OBJECT' and i < len(materials):
+            materials[i] = slot.material.original if slot.material else None
+    return materials
 
 
 def is_listed(obj: bpy.types.Object) -> bool:

@@ -40,12 +40,12 @@ def gone_species(scene: Scene) -> set[str]:
     group, season = scene.tetflora, season_of(scene)
     names = set(edited_infos())
     names |= {e.species for p in group.layers for e in p.mix if e.habitat == 'FALLEN'}
-    found = set()
+    gone = set()
     for name in names:
         with suppress(TetFloraError):  # which is told elsewhere
             if is_gone(species_for(scene, name), season):
-                found.add(name)
-    return found
+                gone.add(name)
+    return gone
 
 
 _NAMED = 3  # objects that a message names before it only counts
@@ -84,8 +84,8 @@ def read_plants(scene: Scene, depsgraph: Depsgraph) -> tuple[Seeds, tuple[tuple[
         return read()
     first, last = exposure(scene)
     seconds = (last - first) * scene.render.fps_base / scene.render.fps
-    found = at_moments(depsgraph, movers, (first, last, (first + last) / 2.0), read)
-    (before, *_), (after, *_), (seeds, owners, unknown) = found
+    moments = at_moments(depsgraph, movers, (first, last, (first + last) / 2.0), read)
+    (before, *_), (after, *_), (seeds, owners, unknown) = moments
     turned = after.frame @ before.frame.transpose(0, 2, 1)
     motion = np.concatenate([after.position - before.position, rotation_vectors(turned)], axis=1) / max(seconds, 1e-9)
     return replace(seeds, motion=motion) if motion.any() else seeds, owners, unknown
@@ -106,8 +106,8 @@ class Source:
         kept = np.array([species_of(kind) not in species for kind in seeds.identifiers], bool)
         if kept.all():
             return self
-        own = np.flatnonzero(kept[seeds.species])
-        left = seeds.take(own), None if ages is None else ages[own], None if sizes is None else sizes.take(own)
+        plants = np.flatnonzero(kept[seeds.species])
+        left = seeds.take(plants), None if ages is None else ages[plants], None if sizes is None else sizes.take(plants)
         return replace(self, part=(name, *left))
 
 
@@ -150,26 +150,26 @@ def read_sources(scene: Scene, depsgraph: Depsgraph) -> list[Source]:
     SceneError
         As `read_plants`, and where nobody has the species of a plant.
     """
-    found = _find_plants(scene, depsgraph)
-    if found.odd or not found.sources:
-        raise found.nothing(scene)
-    return found.sources
+    survey = _find_plants(scene, depsgraph)
+    if survey.odd or not survey.sources:
+        raise survey.nothing(scene)
+    return survey.sources
 
 
 def _read_plants(scene: Scene, depsgraph: Depsgraph) -> tuple[Seeds, tuple[tuple[str, int], ...], str]:
-    found = _find_plants(scene, depsgraph)
-    unknown = {species for _, species in found.odd}
-    read = [some for source in found.sources if len((some := source.without(unknown)).part[1])]
+    survey = _find_plants(scene, depsgraph)
+    unknown = {species for _, species in survey.odd}
+    read = [plants for source in survey.sources if len((plants := source.without(unknown)).part[1])]
     if not read:
-        raise found.nothing(scene)
+        raise survey.nothing(scene)
     owners = [(source.part[0], len(source.part[1])) for source in read]
-    owners[: len(found.single)] = [(obj.name, 1) for some in found.single.values() for obj in some]
+    owners[: len(survey.single)] = [(obj.name, 1) for plants in survey.single.values() for obj in plants]
     aged = classed(scene, [source.part for source in read], depsgraph)
     seen = [
         replace(seeds, identifiers=tuple(str(replace(Kind.read(kind), look=source.look)) for kind in seeds.identifiers))
         for source, (_, seeds) in zip(read, aged, strict=True)
     ]
-    return merged(seen), tuple(owners), f"Left out {_unknown(found.odd)}" if found.odd else ""
+    return merged(seen), tuple(owners), f"Left out {_unknown(survey.odd)}" if survey.odd else ""
 
 
 def _find_plants(scene: Scene, depsgraph: Depsgraph) -> _Found:
@@ -178,7 +178,7 @@ def _find_plants(scene: Scene, depsgraph: Depsgraph) -> _Found:
     objects = sorted(renderable_objects(depsgraph.view_layer), key=lambda o: o.name_full)
     grouped = [(o, o.tetflora) for o in objects]  # asking an object for its group is half of the time
     grouped = [(o, group) for o, group in grouped if group.is_plant or group.is_field]
-    own = [o for o, _ in grouped]
+    owners = [o for o, _ in grouped]
     single = [o for o, group in grouped if group.is_plant and group.enabled and group.species not in assets]
     odd += [(o.name, o.tetflora.species) for o in single if o.tetflora.species not in known]
     looks, alike = LayerLooks(depsgraph.view_layer), {}
@@ -186,15 +186,15 @@ def _find_plants(scene: Scene, depsgraph: Depsgraph) -> _Found:
         if obj.tetflora.species in known:
             alike.setdefault(looks.of(obj), []).append(obj)
     given = [
-        Source(look, (some[0].name, single_plants(some, depsgraph), stored_ages(some), None))
-        for look, some in alike.items()
+        Source(look, (plants[0].name, single_plants(plants, depsgraph), stored_ages(plants), None))
+        for look, plants in alike.items()
     ]
     copies = copies_of([o for o in objects if may_instance(o)], depsgraph)
     enabled = [c for c in copies if c.owner.tetflora.enabled]
     for c in enabled:
         if c.owner.tetflora.is_plant and c.geometry is None and c.owner.tetflora.species not in assets:
             given.append(Source(looks.of(c.owner, c.instancer), (c.owner.name, *_copied_plants(c))))
-    for obj in own:
+    for obj in owners:
         if obj.tetflora.is_field and obj.tetflora.enabled:
             part = read_aged_field(obj, depsgraph, world_matrix(obj, depsgraph)[None])
             given.append(Source(looks.of(obj), (obj.name, *part), obj))
@@ -202,11 +202,11 @@ def _find_plants(scene: Scene, depsgraph: Depsgraph) -> _Found:
         if c.owner.tetflora.is_field:
             part = read_aged_field(c.owner, depsgraph, c.matrices, c.keys, c.geometry)
             given.append(Source(looks.of(c.owner, c.instancer), (c.owner.name, *part)))
-    sources = [some for source in given if len((some := source.without(assets)).part[1])]
+    sources = [plants for source in given if len((plants := source.without(assets)).part[1])]
     for source in sources:
         name, seeds, *_ = source.part
-        odd += [(name, own) for own in dict.fromkeys(map(species_of, _occurring(seeds))) if own not in known]
-    return _Found(sources, alike, odd, own, copies)
+        odd += [(name, one) for one in dict.fromkeys(map(species_of, _occurring(seeds))) if one not in known]
+    return _Found(sources, alike, odd, owners, copies)
 
 
 @dataclass(frozen=True)
@@ -245,43 +245,43 @@ def read_asset_plants(scene: Scene, depsgraph: Depsgraph) -> list[AssetPlants]:
             fields.append(obj)
         elif is_drop(obj):
             drops.append(obj)
-    found = []
+    groups = []
     for (species, _), owners in single.items():
         seed = np.array([o.tetflora.seed for o in owners], dtype=np.int64)
         matrices = np.array([world_matrix(o, depsgraph) for o in owners], dtype=np.float64)
-        found.append(AssetPlants(species, tuple(owners), seed, matrices))
+        groups.append(AssetPlants(species, tuple(owners), seed, matrices))
     for obj in drops:  # one by one: each shows its plant itself
         species = asset_of(obj.instance_collection, scene).identifier
         placed = world_matrix(obj, depsgraph)[None].astype(np.float64)
-        found.append(AssetPlants(species, (obj,), name_keys([obj]).view(np.int64), placed))
+        groups.append(AssetPlants(species, (obj,), name_keys([obj]).view(np.int64), placed))
     copies = [c for c in copies_of([o for o in objects if may_instance(o)], depsgraph) if c.owner.tetflora.enabled]
     for c in copies:
         if c.owner.tetflora.is_plant and c.geometry is None and c.owner.tetflora.species in assets:
             seed = child_key(key_of_seed(c.owner.tetflora.seed), c.keys).view(np.int64)
-            found.append(AssetPlants(c.owner.tetflora.species, (c.owner,), seed, c.matrices))
+            groups.append(AssetPlants(c.owner.tetflora.species, (c.owner,), seed, c.matrices))
     read = [(obj, world_matrix(obj, depsgraph)[None], None, None) for obj in fields]
     read += [(c.owner, c.matrices, c.keys, c.geometry) for c in copies if c.owner.tetflora.is_field]
     for obj, matrices, keys, geometry in read:
         for kind, seed, placed in read_field_matrices(obj, depsgraph, matrices, assets, keys, geometry):
-            found.append(AssetPlants(species_of(kind), (obj,), seed, placed))
-    for plants in found:
+            groups.append(AssetPlants(species_of(kind), (obj,), seed, placed))
+    for plants in groups:
         bad = ~np.isfinite(plants.matrices).all(axis=(1, 2))
         if bad.any():
             names = [plants.owners[min(i, len(plants.owners) - 1)].name for i in np.flatnonzero(bad).tolist()[:_NAMED]]
             named = listed(list(dict.fromkeys(names)))
             raise SceneError(f"{named}: an invalid position; clear it with Alt S and Alt G")
-    return found
+    return groups
 
 
 def single_plants(plants: list[Object], depsgraph: Depsgraph) -> Seeds:
     """Plants that are objects, in their order. Errors are those of `read_plants`."""
     groups = [obj.tetflora for obj in plants]
-    names, own, known = [obj.name for obj in plants], [kind_of_choice(group) for group in groups], catalog()
+    names, kinds, known = [obj.name for obj in plants], [kind_of_choice(group) for group in groups], catalog()
     odd = [(name, group.species) for name, group in zip(names, groups, strict=True) if group.species not in known]
     if odd:
         raise SceneError(_unknown(odd))
-    number = {kind: i for i, kind in enumerate(sorted(set(own)))}
-    species = np.array([number[kind] for kind in own], dtype=np.int32)
+    number = {kind: i for i, kind in enumerate(sorted(set(kinds)))}
+    species = np.array([number[kind] for kind in kinds], dtype=np.int32)
     seeds = np.array([group.seed for group in groups], dtype=np.int64)
     # Some versions of Blender give single precision.
     matrices = np.array([world_matrix(obj, depsgraph) for obj in plants], dtype=np.float64).reshape(-1, 4, 4)
@@ -293,8 +293,8 @@ def _copied_plants(copies: Copies) -> tuple[Seeds, Floats | None, None]:
     plant = copies.owner
     seeds = child_key(key_of_seed(plant.tetflora.seed), copies.keys).view(np.int64)
     age = stored_ages([plant])
-    found = _placed([plant.name], (kind_of(plant),), np.zeros(len(seeds), np.int32), seeds, copies.matrices)
-    return found, None if age is None else np.repeat(age, len(seeds)), None
+    individuals = _placed([plant.name], (kind_of(plant),), np.zeros(len(seeds), np.int32), seeds, copies.matrices)
+    return individuals, None if age is None else np.repeat(age, len(seeds)), None
 
 
 def _placed(names: list[str], kinds: tuple[str, ...], species: Integers32, seeds: Integers, matrices: Floats) -> Seeds:

@@ -164,9 +164,9 @@ def _of_hair(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> skeletons
         mode = _attribute(curves, "knots_mode", none)  # 1 ends at the outer points, 2 Bezier, 3 both
         parts = [chains.without(nurbs)]
         for i in nurbs.tolist():
-            own = slice(first[i], first[i + 1])
+            span = slice(first[i], first[i + 1])
             flags = {"endpoint": mode[i] in (1, 3), "bezier": mode[i] in (2, 3), "cyclic": bool(control.cyclic[i])}
-            parts.append(skeletons.nurbs_chain(points[own], weights[own], int(order[i]), int(steps[i]), **flags))
+            parts.append(skeletons.nurbs_chain(points[span], weights[span], int(order[i]), int(steps[i]), **flags))
         chains = skeletons.Chains.concatenate(parts)
     return _meant_radii(chains, 0.0)
 
@@ -177,8 +177,8 @@ def _read(collection: bpy.types.bpy_prop_collection, name: str, width: int = 1) 
 
 def _attribute(curves: bpy.types.Curves, name: str, default: NDArray) -> NDArray:
     """Values of an attribute of hair curves, like ``default`` in shape and type; ``default`` where it is missing."""
-    found = curves.attributes.get(name)
-    values = None if found is None else values_of(found)
+    stored = curves.attributes.get(name)
+    values = None if stored is None else values_of(stored)
     return default if values is None or values.shape != default.shape else values.astype(default.dtype)
 
 

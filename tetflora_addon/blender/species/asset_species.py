@@ -96,11 +96,11 @@ def _references() -> Counter[object]:
 def asset_species(scene: bpy.types.Scene | None = None) -> dict[str, TetFloraAssetSpecies]:
     """All asset species whose object or collection is there, by identifier; empty, at no cost, in most files."""
     references = _references()
-    found: dict[str, TetFloraAssetSpecies] = {}
+    entries: dict[str, TetFloraAssetSpecies] = {}
     for entry in entries_of(scene):
         if datablock_of(entry, references) is not None:
-            found.setdefault(entry.identifier, entry)
-    return found
+            entries.setdefault(entry.identifier, entry)
+    return entries
 
 
 def asset_of(datablock: Datablock, scene: bpy.types.Scene | None = None) -> TetFloraAssetSpecies | None:
@@ -120,13 +120,13 @@ def copy_asset(source: TetFloraAssetSpecies, entries: bpy.types.bpy_prop_collect
 
 def asset_infos() -> dict[str, FileInfo]:
     """What menus show of asset species."""
-    found: dict[str, FileInfo] = {}
+    infos: dict[str, FileInfo] = {}
     for identifier, entry in asset_species().items():
         datablock = entry.object or entry.collection
         what = "Object" if entry.object else "Variants in a collection" if entry.variants else "Collection"
         text = f"{what} of this file, used as it is; {entry.height:.3g} m tall"
-        found[identifier] = FileInfo(identifier, readable(datablock.name, NAME), text, Path())
-    return found
+        infos[identifier] = FileInfo(identifier, readable(datablock.name, NAME), text, Path())
+    return infos
 
 
 def name_of(identifier: str) -> str:

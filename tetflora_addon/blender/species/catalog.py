@@ -72,15 +72,15 @@ def _icon_of_asset(asset: TetFloraAssetSpecies) -> int:
     if not asset.picture or thumbnails.loaded is None:
         return 0
     name = f"{asset.identifier}|{crc32(asset.picture.encode())}"
-    found = thumbnails.loaded.get(name)
-    if found is None:
+    preview = thumbnails.loaded.get(name)
+    if preview is None:
         pixels = picture_of(asset)
         if pixels is None:
             return 0
-        found = thumbnails.loaded.new(name)
-        found.image_size = PICTURE_SIDE, PICTURE_SIDE
-        found.image_pixels_float.foreach_set(pixels.astype(np.float32).ravel() / 255.0)
-    return found.icon_id
+        preview = thumbnails.loaded.new(name)
+        preview.image_size = PICTURE_SIDE, PICTURE_SIDE
+        preview.image_pixels_float.foreach_set(pixels.astype(np.float32).ravel() / 255.0)
+    return preview.icon_id
 
 
 def unregister() -> None:

@@ -403,14 +403,14 @@ _MAKERS = {"range": _range, "number": _single, "integer": _integer, "color": _to
 
 def _sliders() -> dict[str, Any]:
     """A property for each key of an order, and another for the variation of a color."""
-    made = {}
+    sliders = {}
     for name, key in ORDER_KEYS.items():
         said = {"name": _label(name), "description": _description(name, key), "options": set()}
-        made[name] = _MAKERS[key.kind](name, key, said)
+        sliders[name] = _MAKERS[key.kind](name, key, said)
         if key.kind == "color":
             said |= {"name": f"{said['name']} Variation", "description": f"{_VARIES}: {key.meaning}"}
-            made[name + VARIATION] = _tone(name, key, said, varies=True)
-    return made
+            sliders[name + VARIATION] = _tone(name, key, said, varies=True)
+    return sliders
 
 
 TetFloraSpeciesEditor.__annotations__ |= _sliders()

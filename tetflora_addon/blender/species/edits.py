@@ -155,10 +155,10 @@ def pages_of(collection: bpy.types.Collection) -> tuple[Page, ...]:
 @lru_cache(maxsize=256)
 def _pages(text: str) -> tuple[Page, ...]:
     try:
-        found = parse_json(text)
+        document = parse_json(text)
     except ValueError:
-        found = {}
-    entries = found.items() if isinstance(found, dict) else ()
+        document = {}
+    entries = document.items() if isinstance(document, dict) else ()
     return tuple(Page(name, page) for name, page in entries if is_identifier(name) and isinstance(page, str))
 
 
@@ -335,8 +335,8 @@ def catalog() -> dict[str, FileInfo]:
     known, now = listed(), time.monotonic()
     if _assets is None or now - _assets_at >= _TRUSTED:  # as often as folders
         _assets, _assets_at = asset_infos(), now
-    own = edited_infos() | _assets
-    return in_order(known | own) if own else known
+    infos = edited_infos() | _assets
+    return in_order(known | infos) if infos else known
 
 
 def unknown_text(identifier: str) -> str:
@@ -356,30 +356,30 @@ def grown() -> dict[str, FileInfo]:
 
 def edited_infos() -> dict[str, FileInfo]:
     """What menus show of the species that this file has; the first scene's where scenes disagree."""
-    found: dict[str, FileInfo] = {}
+    infos: dict[str, FileInfo] = {}
     for edit in _edits(None):
-        if edit.identifier not in found:
+        if edit.identifier not in infos:
             try:
                 data = _decoded(edit.text, edit.identifier)
             except SpeciesError:
                 data = {}
-            found[edit.identifier] = info_of(edit.identifier, data, Path())
-    return found
+            infos[edit.identifier] = info_of(edit.identifier, data, Path())
+    return infos
 
 
 def pack(_path: object = None, _other: object = None) -> None:
     """Before a file is written: bring the pages of its collections up to date."""
-    own = {name for name, info in listed().items() if info.is_own}
-    own |= {edit.identifier for edit in listed_in("species_edits")}
+    custom = {name for name, info in listed().items() if info.is_own}
+    custom |= {edit.identifier for edit in listed_in("species_edits")}
     assets = asset_species()
     for collection in bpy.data.collections:
-        if collection.library is not None or not (own or assets or PAGES in collection):
+        if collection.library is not None or not (custom or assets or PAGES in collection):
             continue
         plants = [group for obj in collection.objects if (group := obj.tetflora).is_plant or group.is_field]
         needed = {name for plant in plants for name in (plant.species, *(e.species for e in plant.field_species))}
         # What came by another way, such as Make Local, goes on.
         pages = {page.identifier: page.text for page in pages_of(collection) if page.identifier in needed}
-        for name in sorted(own & needed):
+        for name in sorted(custom & needed):
             with suppress(SpeciesError):  # broken, which is told elsewhere
                 pages[name] = json.dumps(species_data(None, name), ensure_ascii=False)
         text = json.dumps(pages, ensure_ascii=False)

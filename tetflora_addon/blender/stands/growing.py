@@ -52,8 +52,8 @@ class Soil:
 def _stand_site(ground: Terrain, soil: Soil) -> tuple[StandSite, Floats]:
     """The site of a stand, on which plants can be, and the place (2,) that its coordinates are counted from."""
     grid, wetness = _grid(ground.triangles, soil.relief)
-    there = np.isfinite(grid.height)
-    if not there.any():
+    land = np.isfinite(grid.height)
+    if not land.any():
         raise SceneError(
             f"The ground is too small for a stand: no square of {grid.cell:g} m of it is seen from above; use a larger "
             "mesh"
@@ -61,7 +61,7 @@ def _stand_site(ground: Terrain, soil: Soil) -> tuple[StandSite, Floats]:
     height = _whole(grid.height)
     sides = enumerate(height.shape)
     rise = [np.gradient(height, grid.cell, axis=a) if n > 1 else np.zeros_like(height) for a, n in sides]
-    plantable = there & (np.hypot(*rise) <= np.tan(min(soil.slope_max, 1.57)))
+    plantable = land & (np.hypot(*rise) <= np.tan(min(soil.slope_max, 1.57)))
     if not plantable.any():
         raise SceneError(
             f"All of the ground is steeper than Max Slope ({np.degrees(soil.slope_max):.0f}°); raise Max Slope or use "
@@ -157,8 +157,8 @@ def is_stand(obj: Object | None) -> bool:
 def stand_settings_now(scene: Scene, field: Object) -> str:
     """A short text that changes with the settings of a stand, for `TetFloraStand.grown_by`."""
     stand = field.tetflora.stand
-    own = [p.identifier for p in stand.bl_rna.properties if p.type in {'INT', 'FLOAT', 'BOOLEAN', 'STRING'}]
-    values = [getattr(stand, name) for name in own if name not in _STATE]
+    names = [p.identifier for p in stand.bl_rna.properties if p.type in {'INT', 'FLOAT', 'BOOLEAN', 'STRING'}]
+    values = [getattr(stand, name) for name in names if name not in _STATE]
     values += [(entry.species, entry.planted, entry.incoming_seeds) for entry in stand.species]
     values += [one.name_full if one else "" for one in (stand.areas, stand.paths)]
     return digest(values + zone_values(scene, stand))
@@ -196,7 +196,7 @@ def new_stand_steps(
     # The field comes first, with the settings that its plants will grow by: those of the scene may change meanwhile.
     nothing = np.zeros((0, 3)), np.zeros((0, 4)), *np.zeros((1, 0)), *np.zeros((2, 0), np.int32), ()
     field = fields.write_field(name, *nothing)
-    mesh, made = field.data, False
+    mesh, complete = field.data, False
     try:
         stand = field.tetflora.stand
         if fill is None:
@@ -207,13 +207,13 @@ def new_stand_steps(
             stand.grounds.add().object = obj
         grown = yield from _again_steps(data, field, grounds)
         stand = field.tetflora.stand
-        stand.is_grown, made = True, True
+        stand.is_grown, complete = True, True
         field.tetflora.stand_year = float(stand.years)
         field.display_type = 'BOUNDS'  # its points are plants of all years
         link_field(scene, field)
         return grown
     finally:
-        if not made:
+        if not complete:
             if is_there(field):
                 bpy.data.objects.remove(field)
             if is_there(mesh) and not mesh.users:
@@ -280,12 +280,12 @@ def _again_steps(data: JobData, field: Object, grounds: list[Object]) -> Job[Gro
 def _measuring(species: list[Species], records: Records) -> Job[None]:
     """Compile species in the stages that the stand shows, last year first, as far as there is time."""
     end = time.monotonic() + _PATIENCE
-    for some in (records.at(records.year.max()), records):
+    for shown in (records.at(records.year.max()), records):
         for number, one in enumerate(species):
-            own = some.take(np.flatnonzero(some.species == number))
-            pair, own = np.zeros((len(own), 2)), (own.height, own.diameter, own.crown_width, own.crown_base, own.dead)
+            kin = shown.take(np.flatnonzero(shown.species == number))
+            pair, kin = np.zeros((len(kin), 2)), (kin.height, kin.diameter, kin.crown_width, kin.crown_base, kin.dead)
             with suppress(SpeciesError):
-                for kind in kinds_of_sizes(one, Sizes(*own, pair, pair)):
+                for kind in kinds_of_sizes(one, Sizes(*kin, pair, pair)):
                     yield Progress(sum(_GROWING), "Measuring plants")
                     if time.monotonic() > end:
                         return
@@ -358,8 +358,8 @@ def keep_year(field: Object) -> int:
     if not number:
         raise SceneError(f'"{field.name}" has no plants in this year; choose another')
     turn = quaternions(np.moveaxis(points.rotation, 2, 0))
-    own = points.species.astype(np.int32), points.seed.astype(np.int32)
-    other = fields.write_field(field.data.name, points.position, turn, points.scale.mean(axis=0), *own, ())
+    identity = points.species.astype(np.int32), points.seed.astype(np.int32)
+    other = fields.write_field(field.data.name, points.position, turn, points.scale.mean(axis=0), *identity, ())
     # `write_field` counts from a corner near the points; here they stay in the field's own space.
     write(other.data, "position", points.position)
     _hand_over(other, field, _stored(sizes))
@@ -372,11 +372,11 @@ def _stored(sizes: Sizes | None) -> dict[str, NDArray]:
     """Attributes of sizes that say anything."""
     if sizes is None:
         return {}
-    found = _size_columns(sizes.height, sizes.diameter, sizes.width, sizes.base, sizes.dead, sizes.offset)
-    found = {name: column for name, column in found.items() if column.any()}
+    columns = _size_columns(sizes.height, sizes.diameter, sizes.width, sizes.base, sizes.dead, sizes.offset)
+    columns = {name: column for name, column in columns.items() if column.any()}
     if (sizes.fit != 1.0).any():
-        found[fields.FIT] = np.pad(sizes.fit, ((0, 0), (0, 1)))
-    return found
+        columns[fields.FIT] = np.pad(sizes.fit, ((0, 0), (0, 1)))
+    return columns
 
 
 def animate(field: Object, first: int, last: int) -> tuple[float, float]:
@@ -396,8 +396,8 @@ def animate(field: Object, first: int, last: int) -> tuple[float, float]:
     group = field.tetflora
     group.stand_smooth = True
     fields.clear_years(field)
-    for frame, at in ((first, begin), (last, end)):
-        group.stand_year = at
+    for frame, year in ((first, begin), (last, end)):
+        group.stand_year = year
         field.keyframe_insert(fields.YEAR_PATH, frame=frame)
     for curve in fields.year_curves(field):
         for point in curve.keyframe_points:

@@ -161,8 +161,8 @@ def _still_good(scene: bpy.types.Scene, now: Camera | None) -> bool:
 
 def _away(scene: bpy.types.Scene) -> float:
     """Meters to what a viewport turns around."""
-    found = viewport_of(scene)
-    return found[0].region_3d.view_distance if found else 1.0
+    viewport = viewport_of(scene)
+    return viewport[0].region_3d.view_distance if viewport else 1.0
 
 
 def schedule(scene: bpy.types.Scene, by_view: bool = False) -> None:

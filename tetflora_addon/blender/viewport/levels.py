@@ -141,14 +141,14 @@ def _plants_of(scene: Scene, depsgraph: Depsgraph) -> tuple[Seeds, str]:
 
 
 def _asset_crowns(scene: Scene, depsgraph: Depsgraph, boxes: bool) -> list[Shapes]:
-    found = []
+    crowns = []
     for plants in read_asset_plants(scene, depsgraph):
         crown, layer = crown_for(scene, plants.species), depsgraph.view_layer
         seen = plants.matrices[[owner.visible_get(view_layer=layer) for owner in plants.owners]]
         if len(seen):
             colors = crown.color, wood_color(find_asset(scene, plants.species))
-            found.append(simple_crowns(seen, (crown.radius, crown.base, crown.height), colors, boxes))
-    return found
+            crowns.append(simple_crowns(seen, (crown.radius, crown.base, crown.height), colors, boxes))
+    return crowns
 
 
 def _grown(
@@ -176,15 +176,15 @@ def _grown(
         areas = np.concatenate([crown_areas(in_year(scene, measure_of(species).flora)) for species in loaded])
         seeds = shown(replace(seen, seeds=seeds), areas[seeds.species] * seeds.scale**2)
     if make is light_plants and len(seeds) > MOST_FACES:
-        make, some = crowns_of, seeds
+        make, kept = crowns_of, seeds
     else:
-        some = thinned(seeds, np.array([species.orders[0].length.mean for species in loaded]))
+        kept = thinned(seeds, np.array([species.orders[0].length.mean for species in loaded]))
     for number, species in enumerate(loaded):
-        own = some.take(np.flatnonzero(some.species == number))
-        if len(own):
-            one = replace(own, identifiers=(kinds[number],), species=np.zeros(len(own), np.int32))
+        plants = kept.take(np.flatnonzero(kept.species == number))
+        if len(plants):
+            one = replace(plants, identifiers=(kinds[number],), species=np.zeros(len(plants), np.int32))
             out.append(make(in_year(scene, measure_of(species).flora), one))
-    left = len(seeds) - len(some)
+    left = len(seeds) - len(kept)
     return [replace(one, of=one.of + left * (one is out[0])) for one in out]
 
 
@@ -215,8 +215,8 @@ def _on_update(scene: Scene, depsgraph: Depsgraph) -> None:
     for update in depsgraph.updates:
         datablock = update.id
         if isinstance(datablock, Object):
-            own, placed = datablock.original.tetflora, update.is_updated_transform or update.is_updated_geometry
-            changed = placed and (own.is_plant or own.is_field or is_drop(datablock.original))
+            group, placed = datablock.original.tetflora, update.is_updated_transform or update.is_updated_geometry
+            changed = placed and (group.is_plant or group.is_field or is_drop(datablock.original))
         else:  # objects that are deleted or hidden are reported only as updates of what they are in
             known = preview is not None and isinstance(datablock, Scene | Collection)
             now = (len(shown_objects(depsgraph.view_layer)), _moment(scene)) if known and not timeline_moves() else None

@@ -55,10 +55,10 @@ def _buffer(**columns: NDArray) -> gpu.types.GPUVertBuf:
     for name, values in columns.items():
         kind, mode = ('U8', 'INT_TO_FLOAT_UNIT') if values.dtype == np.uint8 else ('F32', 'FLOAT')
         layout.attr_add(id=name, comp_type=kind, len=values.shape[1], fetch_mode=mode)
-    made = gpu.types.GPUVertBuf(layout, len(values))
+    buffer = gpu.types.GPUVertBuf(layout, len(values))
     for name, values in columns.items():
-        made.attr_fill(name, np.ascontiguousarray(values))
-    return made
+        buffer.attr_fill(name, np.ascontiguousarray(values))
+    return buffer
 
 
 def chosen_by_worth(level: Level, forms: set[str], most: int) -> NDArray[np.intp]:
@@ -71,13 +71,13 @@ def chosen_by_worth(level: Level, forms: set[str], most: int) -> NDArray[np.intp
 
 def wires(levels: Levels, level: Level, color: str, forms: set[str]) -> gpu.types.GPUBatch | None:
     """Edges of a level's tetrahedra; None where there are none."""
-    some = chosen_by_worth(level, forms, MOST_WIRES)
-    if len(some) == 0:
+    tetrahedra = chosen_by_worth(level, forms, MOST_WIRES)
+    if len(tetrahedra) == 0:
         return None
-    vertices = levels.vertices(level, some)
-    shown = colors_of(level, color, int(levels.levels[-1].depth.max()))[some]
+    vertices = levels.vertices(level, tetrahedra)
+    shown = colors_of(level, color, int(levels.levels[-1].depth.max()))[tetrahedra]
     colors = np.repeat(_opaque(shown, _WIRE_ALPHA), 4, axis=0)
-    indices = EDGES[None] + 4 * np.arange(len(some))[:, None, None]
+    indices = EDGES[None] + 4 * np.arange(len(tetrahedra))[:, None, None]
     return batch('LINES', vertices.reshape(-1, 3), colors, indices.reshape(-1, 2))
 
 
@@ -85,19 +85,19 @@ def translucent(
     levels: Levels, level: Level, forms: set[str], camera: Camera, most: int
 ) -> tuple[gpu.types.GPUBatch | None, int]:
     """Projected tetrahedra of a level as a camera sees them, farthest first, and how many they are."""
-    some = chosen_by_worth(level, forms, most)
-    some = some[drawable(levels.vertices(level, some), camera)]
-    if len(some) == 0:
+    tetrahedra = chosen_by_worth(level, forms, most)
+    tetrahedra = tetrahedra[drawable(levels.vertices(level, tetrahedra), camera)]
+    if len(tetrahedra) == 0:
         return None, 0
-    some = levels.back_to_front(level, camera, some)
-    projected = project(levels.vertices(level, some).astype(np.float64), level.extinction[some], camera)
-    colors = np.zeros((len(some), 5, 4), np.float32)
-    colors[:, :, :3] = as_shown(level.color[some])[:, None]
+    tetrahedra = levels.back_to_front(level, camera, tetrahedra)
+    projected = project(levels.vertices(level, tetrahedra).astype(np.float64), level.extinction[tetrahedra], camera)
+    colors = np.zeros((len(tetrahedra), 5, 4), np.float32)
+    colors[:, :, :3] = as_shown(level.color[tetrahedra])[:, None]
     colors[:, THICK, 3] = projected.opacity
     triangles = projected.triangles[projected.opacity[projected.triangles[:, 0] // 5] > _FAINT]
     if len(triangles) == 0:
         return None, 0
-    return batch('TRIS', projected.corners.reshape(-1, 3), colors.reshape(-1, 4), triangles), len(some)
+    return batch('TRIS', projected.corners.reshape(-1, 3), colors.reshape(-1, 4), triangles), len(tetrahedra)
 
 
 def plants(shapes: Shapes) -> gpu.types.GPUBatch | None:
@@ -114,9 +114,9 @@ def points(preview: Preview) -> gpu.types.GPUBatch:
     # What is kept holds the array too: another one cannot come to lie at its address.
     _, standing = _kept(preview, "standing", (id(crowns.positions),), lambda: (crowns.positions, _standing(crowns)))
     shown = np.column_stack([as_shown(crowns.looks[:, :3]), crowns.looks[:, 3]])
-    made = gpu.types.GPUBatch(type='POINTS', buf=standing)
-    made.vertbuf_add(_buffer(look=np.rint(255.0 * np.clip(shown, 0.0, 1.0)).astype(np.uint8)[crowns.kinds]))
-    return made
+    overlay = gpu.types.GPUBatch(type='POINTS', buf=standing)
+    overlay.vertbuf_add(_buffer(look=np.rint(255.0 * np.clip(shown, 0.0, 1.0)).astype(np.uint8)[crowns.kinds]))
+    return overlay
 
 
 def _standing(crowns: CrownPoints) -> gpu.types.GPUVertBuf:
@@ -159,12 +159,12 @@ def _shader(
     return gpu.shader.create_from_info(info)
 
 
-def _draw_points(made: gpu.types.GPUBatch, origin: Floats, eye: Floats, least: float) -> None:
+def _draw_points(overlay: gpu.types.GPUBatch, origin: Floats, eye: Floats, least: float) -> None:
     region, height, shader = bpy.context.region_data, bpy.context.region.height, _crown_shader()
     shader.uniform_float("view", (0.5 * height * region.window_matrix[1][1], abs(region.view_matrix[2][2]), 0.0, 0.0))
     shader.uniform_float("eye", (*(eye - origin).tolist(), least))
     gpu.state.program_point_size_set(True)
-    _draw(made, origin, shader)
+    _draw(overlay, origin, shader)
     gpu.state.program_point_size_set(False)
 
 
@@ -208,31 +208,31 @@ def _kept(preview: Preview, name: str, key: tuple, make: Callable[[], object]) -
     return preview.cache[name][1]
 
 
-def _draw(made: gpu.types.GPUBatch | None, origin: Floats, shader: gpu.types.GPUShader | None = None) -> None:
+def _draw(overlay: gpu.types.GPUBatch | None, origin: Floats, shader: gpu.types.GPUShader | None = None) -> None:
     """Draw what counts from a place (3,) in the world, by Blender's own shader or one of ours."""
-    if made is None:
+    if overlay is None:
         return
     with gpu.matrix.push_pop():
         gpu.matrix.translate(origin.tolist())
         if shader is not None:
             shader.uniform_float("matrix", gpu.matrix.get_projection_matrix() @ gpu.matrix.get_model_view_matrix())
-        made.draw(shader or gpu.shader.from_builtin('SMOOTH_COLOR'))
+        overlay.draw(shader or gpu.shader.from_builtin('SMOOTH_COLOR'))
 
 
 def _draw_plants(preview: Preview) -> None:
     shapes = preview.shapes
-    made, near = _kept(preview, "plants", (preview.made,), lambda: plants(shapes)), None
+    mesh, near = _kept(preview, "plants", (preview.made,), lambda: plants(shapes)), None
     if shapes.crowns is not None:
         region = bpy.context.region_data
         place = region.view_matrix.inverted().translation if region.is_perspective else region.view_location
         key = preview.made, *(round(part) for part in place)  # another meter shows others
         name = f"near {bpy.context.space_data.as_pointer()}"
-        found, least, eye = _kept(preview, name, key, lambda: (*nearest(shapes, np.array(place)), np.array(place)))
-        near = _kept(preview, f"{name} faces", key, lambda: plants(found))
+        closest, least, eye = _kept(preview, name, key, lambda: (*nearest(shapes, np.array(place)), np.array(place)))
+        near = _kept(preview, f"{name} faces", key, lambda: plants(closest))
     gpu.state.depth_test_set('LESS_EQUAL')
     gpu.state.depth_mask_set(True)
     gpu.state.face_culling_set('BACK')  # crowns and trunks are closed
-    for one in (made, near):
+    for one in (mesh, near):
         _draw(one, shapes.origin, _faces_shader())
     gpu.state.face_culling_set('NONE')
     if shapes.crowns is not None:
@@ -250,16 +250,16 @@ def _draw_levels(preview: Preview, settings: TetFloraPreview, space: bpy.types.S
     gpu.state.depth_mask_set(False)  # clouds hide nothing
     if settings.projected:
         view = tuple(np.array(space.region_3d.view_matrix).ravel().round(7)), space.region_3d.is_perspective
-        made = _kept(
+        overlay = _kept(
             preview,
             f"projected {space.as_pointer()}",
             (*shown, *view),
             lambda: _made_in_time(preview, level, forms, view_camera(space.region_3d, space.clip_start, origin)),
         )
-        _draw(made, origin)
+        _draw(overlay, origin)
     if settings.wires:
-        made = _kept(preview, "wires", (*shown, settings.color), lambda: wires(levels, level, settings.color, forms))
-        _draw(made, origin)
+        overlay = _kept(preview, "wires", (*shown, settings.color), lambda: wires(levels, level, settings.color, forms))
+        _draw(overlay, origin)
     gpu.state.blend_set('NONE')
 
 
@@ -267,12 +267,12 @@ def _made_in_time(preview: Preview, level: Level, forms: frozenset[str], camera:
     """Translucent tetrahedra of a view; how long it takes decides how many the next view has."""
     most = preview.cache.get("most", _MOST)
     begin = time.perf_counter()
-    made, number = translucent(preview.levels, level, forms, camera, most)
+    overlay, number = translucent(preview.levels, level, forms, camera, most)
     seconds = max(time.perf_counter() - begin, 1e-4)
     if number >= most // 2:
         most = int(most * np.clip(_MOMENT / seconds, 0.5, 2.0))
         preview.cache["most"] = int(np.clip(most, _LEAST, _MOST))
-    return made
+    return overlay
 
 
 def _reach(preview: Preview, camera: Camera) -> float:

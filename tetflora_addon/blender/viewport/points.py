@@ -76,8 +76,8 @@ def _dots_of(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> Dots:
         layer = depsgraph.view_layer
         chosen = [o for o in layer.objects if o.select_get(view_layer=layer)]
         grounds = [o for o in chosen if o.type == 'MESH' and not o.tetflora.is_field]
-    own = set(own_objects(scene, population))
-    placement = read_search(scene, depsgraph, population, own, grounds, MOST_PLACED).placement()
+    plants = set(own_objects(scene, population))
+    placement = read_search(scene, depsgraph, population, plants, grounds, MOST_PLACED).placement()
     number = len(placement)
     drawn = np.linspace(0, number - 1, min(number, MOST_DOTS)).astype(np.int64) if number else np.zeros(0, np.int64)
     origin = origin_near(placement.position)

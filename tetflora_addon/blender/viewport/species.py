@@ -75,8 +75,8 @@ def _limited(flora: Flora, seeds: Seeds) -> tuple[Flora, int]:
 def _place(scene: bpy.types.Scene, mesh: bpy.types.Mesh) -> None:
     """Show a mesh at the scene's 3D cursor, in place of the one before."""
     tag(mesh)
-    found = _objects()
-    if not found or found[0].name not in scene.objects:
+    objects = _objects()
+    if not objects or objects[0].name not in scene.objects:
         _remove()
         collection = bpy.data.collections.new(NAME)
         scene.collection.children.link(collection)
@@ -87,7 +87,7 @@ def _place(scene: bpy.types.Scene, mesh: bpy.types.Mesh) -> None:
         tag(collection)
         tag(obj)
     else:
-        obj = found[0]
+        obj = objects[0]
         old, obj.data = obj.data, mesh
         bpy.data.meshes.remove(old)
     for datablock in (obj, mesh, *_collections()):

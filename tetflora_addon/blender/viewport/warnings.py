@@ -65,7 +65,7 @@ class _Standing(NamedTuple):
     @property
     def place(self) -> Floats:
         """Where all plants stand in the world, (n, 3)."""
-        return np.concatenate([self.feet, *(own for _, own in self.fields)])
+        return np.concatenate([self.feet, *(places for _, places in self.fields)])
 
 
 def warned(context: bpy.types.Context) -> list[Warned]:
@@ -184,28 +184,28 @@ def _standing(layer: bpy.types.ViewLayer) -> Generator[None, None, _Standing]:
     return _Standing(np.array(feet, np.float64).reshape(-1, 3), plants, fields, lamps)
 
 
-def _crowns(scene: bpy.types.Scene, standing: _Standing, at: Floats) -> tuple[Floats, Floats]:
+def _crowns(scene: bpy.types.Scene, standing: _Standing, eye: Floats) -> tuple[Floats, Floats]:
     """Feet (n, 3), and radii and heights (n, 2), of plants near a place, meters; sizes are 0 of unknown crowns."""
-    found: list[tuple] = []  # feet, species, which of these each is, and scales
-    for number in np.flatnonzero(np.linalg.norm(standing.feet[:, :2] - at[:2], axis=1) < _NEAR).tolist():
+    plants: list[tuple] = []  # feet, species, which of these each is, and scales
+    for number in np.flatnonzero(np.linalg.norm(standing.feet[:, :2] - eye[:2], axis=1) < _NEAR).tolist():
         obj = standing.plants[number]
-        found.append((standing.feet[[number]], [obj.tetflora.species], [0], obj.matrix_world.median_scale))
-    for field, own in standing.fields:
-        near = np.flatnonzero(np.linalg.norm(own[:, :2] - at[:2], axis=1) < _NEAR)
+        plants.append((standing.feet[[number]], [obj.tetflora.species], [0], obj.matrix_world.median_scale))
+    for field, places in standing.fields:
+        near = np.flatnonzero(np.linalg.norm(places[:, :2] - eye[:2], axis=1) < _NEAR)
         if len(names := [species_of(kind) for kind in field_kinds(field)]) and len(near):
             which, scale = (stored(field.data, name, near) for name in ("species", "scale"))
             which = np.clip(np.zeros(len(near)) if which is None else which, 0, len(names) - 1).astype(np.int64)
-            found.append((own[near], names, which, 1.0 if scale is None else scale))
-    crowns = {name: crown_to_draw(scene, name) for name in {name for _, names, *_ in found for name in names}}
+            plants.append((places[near], names, which, 1.0 if scale is None else scale))
+    crowns = {name: crown_to_draw(scene, name) for name in {name for _, names, *_ in plants for name in names}}
     size = {name: (0.0, 0.0) if crown is None else (crown.radius, crown.height) for name, crown in crowns.items()}
     feet, sizes = [np.zeros((0, 3))], [np.zeros((0, 2))]
-    for foot, names, which, scale in found:
+    for foot, names, which, scale in plants:
         feet.append(foot)
         sizes.append(np.array([size[name] for name in names])[which] * np.reshape(scale, (-1, 1)))
     return np.concatenate(feet), np.concatenate(sizes)
 
 
-def _buried(layer: bpy.types.ViewLayer, grounds: list[bpy.types.Object], at: Vector) -> float:
+def _buried(layer: bpy.types.ViewLayer, grounds: list[bpy.types.Object], eye: Vector) -> float:
     """Meters from a place up to the uppermost ground, where there is none below it; else 0."""
     heights: list[float] = []
     for obj in (one for one in grounds if one.visible_get(view_layer=layer) and len(one.data.polygons) < _MANY):
@@ -213,22 +213,22 @@ def _buried(layer: bpy.types.ViewLayer, grounds: list[bpy.types.Object], at: Vec
             inverse = obj.matrix_world.inverted_safe()
             for up in (1.0, -1.0):
                 along = (inverse.to_3x3() @ Vector((0.0, 0.0, up))).normalized()
-                hit, place, *_ = obj.ray_cast(inverse @ at, along, depsgraph=layer.depsgraph)
-                heights += [(obj.matrix_world @ place).z - at.z] if hit else []
+                hit, place, *_ = obj.ray_cast(inverse @ eye, along, depsgraph=layer.depsgraph)
+                heights += [(obj.matrix_world @ place).z - eye.z] if hit else []
     return max(heights) if min(heights, default=0.0) > 0.0 else 0.0
 
 
 def _camera(scene: bpy.types.Scene, standing: _Standing, buried: float) -> Iterator[Warned]:
     camera = scene.camera
-    at = np.array(camera.matrix_world.translation)
-    feet, sizes = _crowns(scene, standing, at)
+    eye = np.array(camera.matrix_world.translation)
+    feet, sizes = _crowns(scene, standing, eye)
     if buried:
         text = f'"{camera.name}" is below the ground, which hides all. Move lifts it to eye height'
         yield Warned("below", "Too low", text, "Move", partial(_lift, buried + _EYE))
-    elif _within(at, feet, sizes):
+    elif _within(eye, feet, sizes):
         text = f'"{camera.name}" is inside a crown: leaves fill the picture. Move takes it to the nearest open place'
         yield Warned("crown", "In a crown", text, "Move", _step_out)
-    above = (sizes[:, 0] ** 2).sum(where=feet[:, 2] + sizes[:, 1] > at[2] + _OVERHEAD)
+    above = (sizes[:, 0] ** 2).sum(where=feet[:, 2] + sizes[:, 1] > eye[2] + _OVERHEAD)
     if not buried and above > _CLOSED * _NEAR**2 and scene.view_settings.exposure == 0.0:
         text = "The camera is in a closed wood, which is dark inside. Brighten raises Exposure in Color Management"
         yield Warned("shade", "Dark wood", text, "Brighten", _setter("view_settings.exposure", 2.5))
@@ -255,26 +255,26 @@ def cut_off(scene: bpy.types.Scene, standing: _Standing | None = None) -> tuple[
     return text if beyond else "", float(depth.max())
 
 
-def _within(at: Floats, feet: Floats, sizes: Floats) -> bool:
+def _within(eye: Floats, feet: Floats, sizes: Floats) -> bool:
     """Whether a place is within a crown, as far as eyes mind: not at its rim, and not under it beside the trunk."""
-    (radius, height), up = sizes.T, at[2] - feet[:, 2]
-    away = np.linalg.norm(at[:2] - feet[:, :2], axis=1)
+    (radius, height), up = sizes.T, eye[2] - feet[:, 2]
+    away = np.linalg.norm(eye[:2] - feet[:, :2], axis=1)
     reach = np.where((up > 0.25 * height) | (height < 4.0), 0.6, 0.08) * radius
     return bool(((up >= 0.0) & (up <= height) & (away < reach)).any())
 
 
-def open_place(scene: bpy.types.Scene, at: Floats, ahead: Floats) -> Floats:
+def open_place(scene: bpy.types.Scene, eye: Floats, ahead: Floats) -> Floats:
     """The place (3,) nearest to one (3,), in meters, in no crown and with no trunk close ahead in a direction (3,)."""
-    feet, sizes = _crowns(scene, run_to_end(_standing(scene.view_layers[0])), at)
+    feet, sizes = _crowns(scene, run_to_end(_standing(scene.view_layers[0])), eye)
     trunks, ahead = feet[sizes[:, 1] > _TREE, :2], ahead[:2] / max(np.linalg.norm(ahead[:2]), 1e-6)
     for away in np.arange(0.0, _NEAR, 0.5):
         for angle in np.linspace(0.0, 2.0 * np.pi, 16, endpoint=False):
-            there = at + away * np.array([np.cos(angle), np.sin(angle), 0.0])
-            way = trunks - there[:2]
+            place = eye + away * np.array([np.cos(angle), np.sin(angle), 0.0])
+            way = trunks - place[:2]
             away_ahead = np.linalg.norm(way, axis=1)
-            if not (_within(there, feet, sizes) or ((away_ahead < _BEFORE) & (way @ ahead > 0.9 * away_ahead)).any()):
-                return there
-    return at
+            if not (_within(place, feet, sizes) or ((away_ahead < _BEFORE) & (way @ ahead > 0.9 * away_ahead)).any()):
+                return place
+    return eye
 
 
 def _step_out(scene: bpy.types.Scene) -> None:
