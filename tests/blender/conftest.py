@@ -28,6 +28,22 @@ def quickly_refined(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPa
     monkeypatch.setattr(blade, "_built", _plain_blade)
 
 
+@pytest.fixture(autouse=True)
+def thumbnails_looked_for_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    """As in the window, where it is a second: else each menu of species that is read takes 5 ms, a button up to 20."""
+    from tetflora_addon.blender.species import catalog
+
+    monkeypatch.setattr(catalog, "_TRUSTED", float("inf"))
+
+
+@pytest.fixture
+def thumbnails_looked_for(thumbnails_looked_for_once: None, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Anew each time, for tests of them."""
+    from tetflora_addon.blender.species import catalog
+
+    monkeypatch.setattr(catalog, "_TRUSTED", 0.0)
+
+
 def _plain_bark(character: str) -> Any:
     """The group of a bark, of its color all over."""
     from tetflora_addon.blender.materials import bark, nodes
