@@ -196,7 +196,7 @@ def test_a_species_is_looked_at_once(monkeypatch: pytest.MonkeyPatch) -> None:
 
     def noted(flora: Flora, number: int, rays: float):
         asked.append(flora.species[number].identifier)
-        return real(flora, number, rays)
+        return real(flora, number, rays / 10)
 
     monkeypatch.setattr(subject, "fitting", noted)
     monkeypatch.setattr(subject, "shipped", dict)
