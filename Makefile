@@ -89,6 +89,8 @@ LTS_DESELECTED = scene/test_wind.py::test_a_picture_with_motion_blur_is_the_mean
 	materials/test_snow.py::test_a_crown_of_facets_is_as_white_as_its_leaves \
 	$(addprefix results/test_baked_light.py::,test_baked_proxies_are_as_bright_as_lit_ones \
 	test_baked_pictures_have_next_to_no_noise)
+# Baked light leaves nothing of proxies; that of real leaves is the same attributes on other meshes.
+LTS_DESELECTED += results/test_baked_light.py::test_clear_and_esc_leave_nothing_of_baked_light[ALL-
 # EEVEE of 4.5 compiles each material for longer than all the rest takes. It draws one of each kind of proxy, baked
 # light, and instances; nodes of bark and blades give there what they give in Cycles.
 LTS_DESELECTED += materials/test_blade.py::test_the_mean_is_the_same_in_eevee \

@@ -15,17 +15,37 @@ session.start()
 @pytest.fixture(autouse=True)
 def quickly_refined(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
     """Small images get facets no finer than asked for, and bark and leaves no pattern: both are most of a refinement.
+    Of assets one cluster is looked at from one side, to see how much of its facets lies behind others.
 
     Not where a test or its file is marked ``fine``: there results are what artists get.
     """
     if request.node.get_closest_marker("fine"):
         return
+    from tetflora_addon.assets import compiled
     from tetflora_addon.blender.materials import blade, materials
     from tetflora_addon.emission import budget
 
     monkeypatch.setattr(budget, "FINEST", 1.0)
+    monkeypatch.setattr(compiled, "CLUSTERS", 1)
+    monkeypatch.setattr(compiled, "DIRECTIONS", compiled.DIRECTIONS[:1])
     monkeypatch.setattr(materials, "bark_group", _plain_bark)
     monkeypatch.setattr(blade, "_built", _plain_blade)
+
+
+@pytest.fixture(autouse=True)
+def thumbnails_looked_for_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    """As in the window, where it is a second: else each menu of species that is read takes 5 ms, a button up to 20."""
+    from tetflora_addon.blender.species import catalog
+
+    monkeypatch.setattr(catalog, "_TRUSTED", float("inf"))
+
+
+@pytest.fixture
+def thumbnails_looked_for(thumbnails_looked_for_once: None, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Anew each time, for tests of them."""
+    from tetflora_addon.blender.species import catalog
+
+    monkeypatch.setattr(catalog, "_TRUSTED", 0.0)
 
 
 def _plain_bark(character: str) -> Any:

@@ -286,6 +286,7 @@ TABLE = np.ones((2, _ROWS, len(facet_weights.COUNTS)), np.float32)
 
 def test_species_that_are_found_together_are_what_they_are_alone(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(facet_weights, "shipped", dict)
+    monkeypatch.setattr(facet_weights, "RAYS", 600.0)
     files = {"few": support.small(order2={"leaves": [3, 0]}), "many": support.small(order2={"leaves": [9, 2]})}
     some = [species_from_dict(data, name, f"{name}.json") for name, data in files.items()]
     found = []

@@ -9,12 +9,14 @@ import numpy as np
 
 from examples import million
 from tests.blender.scenes import depsgraph
+from tetflora_addon.blender.placing import cover
 from tetflora_addon.blender.scene import plants
 
 
 def test_forest_stands_as_it_is_described(clean_file, tmp_path, monkeypatch):
     monkeypatch.setattr(million, "_CLEAR", 25.0)  # what covers the summit takes longest
     monkeypatch.setattr(million, "_MEADOW", 52.0)
+    monkeypatch.setattr(cover, "MOST", 300)
     made = million.render_million(tmp_path / "forest.png", plants=200, width=32, samples=1)
     assert made["polygons"] + made["facets"] > 0
     assert (tmp_path / "forest.png").is_file()

@@ -22,7 +22,7 @@ from tetflora_addon.blender.viewport import levels, state
 from tetflora_addon.errors import SceneError, SpeciesError
 from tetflora_addon.files import is_identifier
 
-pytestmark = pytest.mark.usefixtures("clean_file")
+pytestmark = pytest.mark.usefixtures("clean_file", "thumbnails_looked_for")
 
 
 def test_an_object_is_a_species_in_all_menus_with_its_measures_and_a_picture():

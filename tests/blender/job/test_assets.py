@@ -392,7 +392,7 @@ def _faces(mesh):
 @pytest.mark.parametrize("closed", [False, True])
 def test_clusters_are_faces_of_the_original_where_they_were(closed, monkeypatch, tmp_path):
     """So they are drawn where memory has no room for originals; small leaves are kites if they have many faces."""
-    scene, _, tree = forest(away=8.0, count=2500, closed=closed)
+    scene, _, tree = forest(away=8.0, count=1500, closed=closed)
     before = [matrix for _, matrix in shown()]
     picture = _covered(scene, tmp_path / "before.png")
     monkeypatch.setattr(AssetCosts, "plain", lambda *_: False)

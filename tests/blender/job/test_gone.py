@@ -35,6 +35,8 @@ def scene(clean_file) -> bpy.types.Scene:
     ground.tetflora.is_explicit = True
     add_camera(location=(0.0, -14.0, 3.0), rotation=(1.4, 0.0, 0.0))
     made.render.resolution_x = made.render.resolution_y = 48
+    settings = made.tetflora  # a coarse result takes the same steps
+    settings.leaf_limit, settings.cutoff, settings.visibility_resolution = 1.0, 6.0, 64
     for number in range(2):
         add_plant(f"bush {number}", "bush", seed=number, location=(3.0 * number - 1.5, 0.0, 0.0))
     leaf = add_mesh("leaf", size=0.05)

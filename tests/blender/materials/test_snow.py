@@ -270,19 +270,20 @@ def test_soil_has_snow_while_a_scene_has():
     assert _nodes(made.node_tree) == before
 
 
-@pytest.mark.parametrize("turn", [0.0, np.pi / 2])
-def test_a_crown_of_facets_is_as_white_as_its_leaves(turn):
+def test_a_crown_of_facets_is_as_white_as_its_leaves():
     """From above and from the side; facets and leaves differ by up to a seventh, in summer too."""
     small_scene(sky=0.5, sun=35.0, samples=24, size=48, width=14.0)
     scene = bpy.context.scene
     scene.render.film_transparent = True  # without the sky behind
-    scene.camera.location = (0.0, -50.0 * np.sin(turn), 7.0 + 50.0 * np.cos(turn))
-    scene.camera.rotation_euler = (turn, 0.0, 0.0)
     add_plant(species="beech")
     _year(0.5)
     seen = []
     for everything in (False, True):
         scene.tetflora.expand_everything = everything
-        refine.refine(scene, depsgraph())
-        seen.append(_mean())
-    np.testing.assert_allclose(*seen, rtol=0.15)
+        for turn in (0.0, np.pi / 2):
+            scene.camera.location = (0.0, -50.0 * np.sin(turn), 7.0 + 50.0 * np.cos(turn))
+            scene.camera.rotation_euler = (turn, 0.0, 0.0)
+            if not (everything and turn):  # all leaves are the same from wherever they are seen
+                refine.refine(scene, depsgraph())
+            seen.append(_mean())
+    np.testing.assert_allclose(seen[:2], seen[2:], rtol=0.15)

@@ -98,6 +98,7 @@ def test_a_list_whose_only_layer_was_deleted_with_its_object_is_said_to_be_empty
     """*Select a layer* stood below a list without rows."""
     select(add_mesh("ground", size=20.0))
     bpy.context.scene.tetflora.stand.years = 2
+    bpy.context.scene.tetflora.stand.species.add().species = "birch"
     bpy.ops.tetflora.grow_stand()
     bpy.data.objects.remove(active_layer(bpy.context.scene).field)
     layout = Layout()

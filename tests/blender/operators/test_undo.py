@@ -20,6 +20,7 @@ from tests import places_files
 from tests.blender.digests import difference, everything
 from tests.blender.scenes import add_camera, add_mesh, add_plant, depsgraph, select
 from tetflora_addon.blender import compat
+from tetflora_addon.blender.biomes import library
 from tetflora_addon.blender.job import refine
 from tetflora_addon.blender.placing import rules
 from tetflora_addon.blender.species.catalog import OWN_FILES
@@ -58,7 +59,7 @@ def ground_active() -> None:
 
 def biome_added() -> None:
     ground_active()
-    assert ops().add_biome(biome="dead_forest") == {'FINISHED'}
+    assert ops().add_biome(biome="copse") == {'FINISHED'}
 
 
 def change_biome() -> None:
@@ -208,7 +209,7 @@ CASES: list[Case] = [
     ("update_layers of a stand", lambda: (stand(), change_stand()), "update_layers", {}),
     ("animate_growth", stand, "animate_growth", {}),
     ("keep_year", stand, "keep_year", {}),
-    ("add_biome", ground_active, "add_biome", {"biome": "dead_forest"}),
+    ("add_biome", ground_active, "add_biome", {"biome": "copse"}),
     ("update_layers of a biome", lambda: (biome_added(), change_biome()), "update_layers", {}),
     ("remove_layer of a biome", biome_added, "remove_layer", {}),
     ("look", ground_active, "look", {}),
@@ -254,9 +255,33 @@ def erase_place() -> None:
     rules.note_erased(scene().tetflora.layers[0], [(0.0, 0.0)], 2.0)
 
 
+#: A stand, and a cover of a species of the biome's own.
+BIOME = {
+    "format": "TetFlora biome",
+    "version": 1,
+    "name": "Copse",
+    "ground": {"earth": [0.045, 0.042, 0.04], "turf": [0.06, 0.085, 0.025], "turf_share": 0.2, "hills": 1},
+    "species": {"shrub": {"of": "bush", "name": "Shrub"}},
+    "layers": [
+        {
+            "kind": "stand",
+            "name": "Birches",
+            "years": 6,
+            "interval": 0,
+            "density": 1500,
+            "species": [{"species": "birch"}],
+        },
+        {"kind": "cover", "name": "Shrubs", "by_density": True, "density": 900, "species": [{"species": "shrub"}]},
+    ],
+}
+
+
 @pytest.fixture
-def history(clean_file) -> None:
-    """An empty file, the memory of undo included."""
+def history(clean_file, tmp_path, monkeypatch) -> None:
+    """An empty file, the memory of undo included; the only biome is a small one."""
+    (tmp_path / "biomes").mkdir()
+    (tmp_path / "biomes" / "copse.json").write_text(json.dumps(BIOME), "utf-8")
+    monkeypatch.setattr(library, "builtin_folder", lambda: tmp_path / "biomes")
     bpy.ops.ed.undo_push(message="Begin")
 
 

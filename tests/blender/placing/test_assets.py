@@ -22,7 +22,7 @@ from tetflora_addon.blender.species import catalog
 from tetflora_addon.blender.species.catalog import FALLBACK_ICON, icon_of, items_for, thumbnail_file
 from tetflora_addon.species.catalog import builtin_folder, list_species
 
-pytestmark = pytest.mark.usefixtures("clean_file")
+pytestmark = pytest.mark.usefixtures("clean_file", "thumbnails_looked_for")
 
 
 @pytest.fixture

@@ -26,12 +26,23 @@ from tetflora_addon.blender.placing.cover import cover_steps
 from tetflora_addon.blender.scene import fields
 from tetflora_addon.blender.species.edits import species_for
 from tetflora_addon.blender.worker import run_to_end
+from tetflora_addon.buffers import MeshBuffers
 from tetflora_addon.compiled.flora import compile_species
 
 pytestmark = pytest.mark.usefixtures("clean_file")
 
 #: Side of what is looked at, and how far around it plants may reach into it, meters; rays along the side.
-_SEEN, _AROUND, _RAYS = 4.0, 0.7, 60
+_SEEN, _AROUND, _RAYS = 2.4, 0.7, 60
+
+
+def _triangles(part: MeshBuffers) -> np.ndarray:
+    """Indices (n, 3) of corners, faces cut into fans."""
+    first, number = part.face_offsets[:-1], np.diff(part.face_offsets)
+    fans = []
+    for k in range(1, int(number.max()) - 1):
+        some = first[number > k + 1]
+        fans.append(part.corner_verts[np.stack([some, some + k, some + k + 1], axis=1)])
+    return np.concatenate(fans)
 
 
 def _tree(read: fields.Seeds, near: np.ndarray) -> BVHTree:
@@ -40,15 +51,15 @@ def _tree(read: fields.Seeds, near: np.ndarray) -> BVHTree:
     for kind in np.unique(read.species[near]).tolist():
         name = read.identifiers[kind]
         flora = compile_species([species_for(bpy.context.scene, name)])
-        variants[kind] = [[b for *_, b in plant_parts(flora, single_seed(name, seed))] for seed in range(3)]
+        made = ([b for *_, b in plant_parts(flora, single_seed(name, seed))] for seed in range(3))
+        variants[kind] = [[(part.positions, _triangles(part)) for part in parts] for parts in made]
     points, polygons, count = [], [], 0
     for plant in near.tolist():
-        for part in variants[int(read.species[plant])][plant % 3]:
-            points.append(part.positions @ read.frame[plant].T * read.scale[plant] + read.position[plant])
-            corners = np.split(part.corner_verts + count, part.face_offsets[1:-1])
-            polygons += [face.tolist() for face in corners]
-            count += len(part.positions)
-    return BVHTree.FromPolygons(np.concatenate(points).tolist(), polygons)
+        for positions, triangles in variants[int(read.species[plant])][plant % 3]:
+            points.append(positions @ read.frame[plant].T * read.scale[plant] + read.position[plant])
+            polygons.append(triangles + count)
+            count += len(positions)
+    return BVHTree.FromPolygons(np.concatenate(points).tolist(), np.concatenate(polygons).tolist(), all_triangles=True)
 
 
 def _hidden() -> float:
@@ -66,7 +77,7 @@ def _hidden() -> float:
 
 def test_grass_hides_most_of_open_ground() -> None:
     """From 80 to 100 % of it."""
-    ground = add_mesh("ground", size=8.0)
+    ground = add_mesh("ground", size=5.0)
     add_plant("far", "birch", 1, (100.0, 0.0, 0.0))
     scene = bpy.context.scene
     cover = populations.add_population(scene, [ground], name="open")
@@ -78,6 +89,6 @@ def test_grass_and_moss_hide_the_floor_of_a_light_wood() -> None:
     """Where the trees leave light; without the trees, so that nothing else hides it."""
     biome = read_biome(library.builtin_folder() / "birch_pine.json")
     (low,) = [layer for layer in biome.layers if layer["kind"] == "cover"]
-    ground = add_mesh("ground", size=8.0)
+    ground = add_mesh("ground", size=5.0)
     run_to_end(add_biome_steps(bpy.context.scene, depsgraph(), replace(biome, layers=[low]), [ground]))
     assert _hidden() >= 0.7

@@ -12,9 +12,15 @@ from panels import refine
 from tests.blender.scenes import add_camera, add_mesh, datablocks
 from tetflora_addon.blender import preferences, settings
 from tetflora_addon.blender.job import contents
-from tetflora_addon.blender.placing import first_forest
+from tetflora_addon.blender.placing import cover, first_forest
 
-pytestmark = pytest.mark.usefixtures("clean_file")
+pytestmark = pytest.mark.usefixtures("clean_file", "little_cover")
+
+
+@pytest.fixture
+def little_cover(monkeypatch):
+    """Of its plants of ground cover only some stand; no test counts them."""
+    monkeypatch.setattr(cover, "MOST", 500)
 
 
 def _plant(**options):

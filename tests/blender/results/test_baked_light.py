@@ -176,10 +176,10 @@ def test_it_throws_a_shadow_and_lights_nothing():
 FORMS = ['MICROSURFACES', 'SHELLS', 'MICROSPHERES']
 
 
-def bush_before_the_sky(engine='CYCLES', samples=16):
-    """A bush that is proxies for the most part, in sun and skylight, 48 pixels wide; gives the scene."""
+def bush_before_the_sky(engine='CYCLES', samples=16, size=48):
+    """A bush that is proxies for the most part, in sun and skylight, so many pixels wide; gives the scene."""
     samples = samples if engine == 'CYCLES' else same_samples(engine)  # of half a second each, without a GPU
-    small_scene(sky=0.4, samples=samples, sun=40.0, size=48, width=3.6, shadows=True)
+    small_scene(sky=0.4, samples=samples, sun=40.0, size=size, width=3.6, shadows=True)
     scene = bpy.context.scene
     scene.render.engine = engine if engine == 'CYCLES' else compat.eevee_engine()
     scene.cycles.transparent_max_bounces = scene.cycles.min_transparent_bounces = 256
@@ -204,7 +204,7 @@ def results(scene, *kinds):
 @pytest.mark.parametrize(("form", "bound"), [('MICROSURFACES', 0.2), ('MICROSPHERES', 0.25), ('SHELLS', 0.35)])
 def test_baked_proxies_are_as_bright_as_lit_ones(form, bound, engine):
     """Mean over the plant, told by what its darkness leaves of the sky; EEVEE lights shells and spheres its own way."""
-    scene = bush_before_the_sky(engine)
+    scene = bush_before_the_sky(engine, size=32 if engine == 'CYCLES' else 48)
     lit = refined(scene, proxy_kind=form)
     assert lit.polygons_proxy > 200
     one = picture()
@@ -223,7 +223,7 @@ def test_baked_pictures_have_next_to_no_noise(form):
 
     For the same reason all samples are taken in the middle of their pixel.
     """
-    scene = bush_before_the_sky(samples=16)
+    scene = bush_before_the_sky(size=32)
     scene.cycles.pixel_filter_type, scene.cycles.filter_width = 'BLACKMAN_HARRIS', 0.01
 
     def noise():
@@ -242,7 +242,7 @@ def test_baked_pictures_have_next_to_no_noise(form):
 @pytest.mark.parametrize("form", FORMS)
 @pytest.mark.parametrize("baked", ['PROXIES', 'ALL'])
 def test_clear_and_esc_leave_nothing_of_baked_light(form, baked):
-    scene = bush_before_the_sky()
+    scene = bush_before_the_sky(size=16)
     scene.tetflora.proxy_kind, scene.tetflora.baked_light = form, baked
     before = datablocks()
     refined(scene)
@@ -311,7 +311,7 @@ def test_meshes_that_hide_plants_throw_shadows_and_light():
 
 
 def test_shells_follow_the_scene_and_old_groups_give_way():
-    scene = bush_before_the_sky()
+    scene = bush_before_the_sky(size=16)
     refined(scene, proxy_kind='SHELLS', shell_diffuse=0.5, shell_spear=20.0, shell_roundness=0.25)
 
     def group():

@@ -26,6 +26,8 @@ def scene(clean_file):
     """Two bushes of one species side by side; the left one, or what stands for it, is `special`."""
     scene = tiny_render(samples=2, size=24)
     scene.render.film_transparent = True
+    settings = scene.tetflora  # no test looks at leaves
+    settings.leaf_limit, settings.cutoff, settings.visibility_resolution = 1.0, 6.0, 64
     add_camera(location=(0.0, -13.0, 1.2))
     add_plant("plain", location=RIGHT, seed=2)
     return scene

@@ -20,7 +20,7 @@ from tetflora_addon.blender import file_library, preferences
 from tetflora_addon.blender.species import catalog as menus
 from tetflora_addon.blender.species import edits
 
-pytestmark = pytest.mark.usefixtures("clean_file")
+pytestmark = pytest.mark.usefixtures("clean_file", "thumbnails_looked_for")
 
 
 @pytest.fixture

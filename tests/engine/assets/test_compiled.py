@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -13,11 +14,23 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from tests.engine.assets import trees
+from tetflora_addon.assets import compiled as subject
 from tetflora_addon.assets.asset import COUNTS, MESH_FACES, Asset, AssetSource
 from tetflora_addon.assets.measures import through_both_sides
 from tetflora_addon.errors import TetFloraError
 
 KINDS = sorted(trees.SOURCES)
+
+
+@pytest.fixture(autouse=True, scope="module")
+def few_views() -> Iterator[None]:
+    """Weights of facets are in test_facet_weights.py; to find them is most of compiling."""
+    trees.compiled.cache_clear()
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(subject, "CLUSTERS", 1)
+        patch.setattr(subject, "DIRECTIONS", subject.DIRECTIONS[:1])
+        yield
+    trees.compiled.cache_clear()  # other files have assets as they are
 
 
 def triangles_by_cluster(source: AssetSource, asset: Asset) -> tuple[NDArray, NDArray, NDArray[np.int64]]:

@@ -54,9 +54,9 @@ def outside(flora: Flora, subplants: Branches) -> float:
 
 @pytest.mark.parametrize("species", range(len(support.SPECIES)), ids=support.SPECIES)
 def test_every_vertex_of_many_plants_is_inside_the_bound(species: int) -> None:
-    """As many as some thousand polygons make, at most four: other tests draw species at random."""
+    """As many as some thousand polygons make, at most two: other tests draw species at random."""
     flora = support.lean()
-    number = int(np.clip(support.FEW_POLYGONS / flora.polygons[flora.first_row[species]], 1, 4))
+    number = int(np.clip(support.FEW_POLYGONS / flora.polygons[flora.first_row[species]], 1, 2))
     trunk = support.trunks(flora.rows, support.plants(np.arange(number), species))
     assert outside(flora, trunk) < _FLOAT32
 

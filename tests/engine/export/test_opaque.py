@@ -7,12 +7,21 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+import pytest
 
 from tests.engine.export.test_levels import square
 from tetflora_addon.buffers import MeshBuffers
+from tetflora_addon.export import opaque as subject
 from tetflora_addon.export.levels import PlantLevel
 from tetflora_addon.export.opaque import opaque, sides_of
 from tetflora_addon.optics import PALER, THROUGH_TINT
+
+
+@pytest.fixture(autouse=True)
+def coarse_views(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A sheet needs no more cells across to be a sheet."""
+    monkeypatch.setattr(subject, "_CELLS", 96)
+
 
 COLOR, PASSED = np.array([0.1, 0.2, 0.05]), 0.4
 
