@@ -311,7 +311,7 @@ class SiblingGroups:
     """Siblings of sub-plants, or what their branches themselves bear."""
 
     flora: Flora
-    some: Branches  # of n
+    kin: Branches  # of n
     beyond: Floats  # (3,): offset at which a copy meets none of them, meters
     #: area and leaf, (n,): optical area of each, and area of one of its leaves, m².
     area: Floats
@@ -333,20 +333,20 @@ class SiblingGroups:
     @property
     def content(self) -> tuple[bytes, bool]:
         """What follows from all that is grown: equal for whole sub-plants and branches on which nothing grows."""
-        rows = self.flora.rows[np.unique(self.some.row)]
+        rows = self.flora.rows[np.unique(self.kin.row)]
         bare = not ((rows["next"] >= 0).any() or rows["phantom"].any())
-        return self.some.key.tobytes() + self.some.position.tobytes(), bare or self.pieces is not None
+        return self.kin.key.tobytes() + self.kin.position.tobytes(), bare or self.pieces is not None
 
     def grown(self) -> PlantElements:
         """The real leaves and wood."""
-        forms = self.flora.forms[int(self.flora.species_of(self.some.row[:1])[0])]
+        forms = self.flora.forms[int(self.flora.species_of(self.kin.row[:1])[0])]
         rows, orders = len(self.flora.rows), -1 if self.pieces is None else 1
-        return elements_of(self.flora.rows, forms, self.some, np.zeros(rows, np.intp), 0, np.ones(rows), orders)
+        return elements_of(self.flora.rows, forms, self.kin, np.zeros(rows, np.intp), 0, np.ones(rows), orders)
 
     def facets(self, side: float, copies: int) -> Facets:
         """Facets of a side in meters for several copies of all side by side, each copy with other facets."""
         if self.pieces is None:
-            several = Branches.concatenate([self._copy(self.some, n) for n in range(copies)])
+            several = Branches.concatenate([self._copy(self.kin, n) for n in range(copies)])
             return subplant_facets(self.flora, several, FacetRules(np.full(len(several), side)))
         several = []
         for n in range(copies):

@@ -578,7 +578,7 @@ def jointed(graph: Graph, place: Place) -> tuple[Term, Term]:
 
 _CHARACTERS: dict[str, Bark] = {
     "ridged": Bark(ridged, 11.0, 6.0, (0.427, 0.394, 0.335), 0.95, 0.3, 0.22, 0.8, 1.0, 0.6),
-    "plated": Bark(lambda *at: _plates(*at)[:2], 6.0, 2.8, (0.33, 0.245, 0.203), 1.0, 0.18, 0.25, 0.8, 0.3, 0.4),
+    "plated": Bark(lambda *args: _plates(*args)[:2], 6.0, 2.8, (0.33, 0.245, 0.203), 1.0, 0.18, 0.25, 0.8, 0.3, 0.4),
     "smooth": Bark(smooth, 6.0, 0.3, (0.445, 0.449, 0.422), 1.0, 0.02, 0.12, 0.4, 0.8, 0.9),
     "banded": Bark(banded, 7.0, 0.2, (0.636, 0.614, 0.595), 1.0, 0.05, 0.1, 0.3, 0.4, 0.5),
     "ringed": Bark(ringed, 2.2, 1.2, (0.519, 0.519, 0.519), 0.7, 0.07, 0.2, 0.6, power=0.0),

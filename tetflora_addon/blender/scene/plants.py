@@ -118,22 +118,22 @@ class _Found:
     sources: list[Source]
     single: dict[str, list[Object]]  # plants that are objects, by look: they come first
     odd: list[tuple[str, str]]  # names of objects with species that nobody has
-    own: list[Object]  # plants and fields of the view layer
+    owners: list[Object]  # plants and fields of the view layer
     copies: list[Copies]
 
     def nothing(self, scene: Scene) -> SceneError:
         """The error where no plant is left."""
         if self.odd:
             return SceneError(_unknown(self.odd))
-        if (self.own or self.copies) and not any(
-            o.tetflora.enabled for o in (*self.own, *(c.owner for c in self.copies))
+        if (self.owners or self.copies) and not any(
+            o.tetflora.enabled for o in (*self.owners, *(c.owner for c in self.copies))
         ):
             return NoPlantsError("All plants in the scene are disabled; enable some in the TetFlora tab of the sidebar")
-        if fields := [o.name for o in self.own if o.tetflora.is_field]:
+        if fields := [o.name for o in self.owners if o.tetflora.is_field]:
             return NoPlantsError(
                 f"{listed(fields)}: the field of plants has no points; add vertices, or populate a mesh"
             )
-        if hidden := sum(o.tetflora.is_plant or o.tetflora.is_field for o in scene.objects) - len(self.own):
+        if hidden := sum(o.tetflora.is_plant or o.tetflora.is_field for o in scene.objects) - len(self.owners):
             return NoPlantsError(
                 f"No plants to render; {hidden:,} are hidden in renders or excluded from the view layer. Enable them "
                 "or their collections in the Outliner"
