@@ -46,7 +46,7 @@ def problems() -> list[str]:
     """Everything that breaks a rule, one line each; empty when the house is in order."""
     found = rooms.problems()
     for path in rooms.sources().values():
-        found += words.fillers(path.relative_to(ROOT).as_posix(), rooms.tree(path))
+        found += words.fillers(path.relative_to(rooms.ROOT).as_posix(), rooms.tree(path))
     for path in files():
         name = path.relative_to(ROOT).as_posix()
         try:
