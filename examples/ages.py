@@ -20,7 +20,7 @@ import numpy as np
 from . import figure, stage
 from .paper.pictures import save_sheet
 
-SPECIES, SEED = "oak", 1
+SPECIES, SEED = "oak", 3
 AGES = (8.0, 18.0, 35.0, 80.0, 300.0, 545.0)
 SIZE, SAMPLES = (530, 400), 24
 #: Where the figure stands: so far to the left of the trunk's surface, and before it, meters.
