@@ -137,14 +137,10 @@ def rows_of(text: str) -> tuple[tuple[str, str], ...]:
         seconds = figures["seconds"]
         full = figures["polygons_full"]
         fraction = f"{figures['polygons_meshed'] / full:.1%}" if full else "–"
-        instances = (
-            ("Instances", "instances"),
-            ("    Originals", "instances_whole"),
-            ("    Clusters", "instances_clusters"),
-        )
+        instances = {"Instances": "instances", "    Originals": "instances_whole", "    Clusters": "instances_clusters"}
         return (
             ("Plants", f"{figures['plants']:,}"),
-            *((name, f"{figures[key]:,}") for name, key in instances if figures.get("instances")),
+            *((name, f"{figures[key]:,}") for name, key in instances.items() if figures.get("instances")),
             ("Polygons If Expanded", f"{full:,}"),
             ("Polygons", f"{figures['polygons_meshed']:,}"),
             ("    Fraction of All", fraction),

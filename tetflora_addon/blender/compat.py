@@ -88,10 +88,7 @@ def blend_in_mesh_order(material: bpy.types.Material) -> None:
 
 
 def drawn_disc(engine: str) -> float:
-    """Area that a renderer draws for a point of radius 1 of a point cloud.
-
-    EEVEE draws a square that stands on its corner, within the circle that Cycles draws.
-    """
+    """Area drawn for a point of radius 1 of a point cloud: EEVEE draws a square in the circle that Cycles draws."""
     return 2.0 if engine in EEVEE_ENGINES else pi
 
 

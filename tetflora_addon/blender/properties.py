@@ -64,10 +64,7 @@ class TetFloraFieldEntry(bpy.types.PropertyGroup, SpeciesChoice):
 
 
 class TetFloraObject(bpy.types.PropertyGroup, SpeciesChoice):
-    """A plant is a species, a transform and a seed; nothing else is stored (paper, section 5).
-
-    A field is an object whose points are plants.
-    """
+    """A plant is a species, a transform and a seed (paper, section 5); a field is an object whose points are plants."""
 
     version: integer("Version", "Layout of these properties", **HIDDEN)
     is_plant: boolean(

@@ -174,10 +174,7 @@ def camera_moves(scene: Scene) -> bool:
 def key_of(
     scene: Scene, depsgraph: Depsgraph, layers: Sequence[ViewLayer], camera: Camera, contents: SceneContents
 ) -> str:
-    """Digest of all that results for view layers depend on, with their camera and contents.
-
-    Errors are those of `scene_digest`.
-    """
+    """Digest of all that results for view layers, a camera and contents depend on; errors as of `scene_digest`."""
     content = hashlib.sha256(scene_digest(scene, depsgraph, camera, contents).encode())
     add_to_digest(content, [scene.name, *(layer.name for layer in layers)])
     for group in (scene.tetflora, scene.tetflora.output, *scene.tetflora.output.species):

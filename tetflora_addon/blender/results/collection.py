@@ -111,10 +111,7 @@ class Results:
         species: Species | None = None,
         look: str = "",
     ) -> Generator[None, None, bpy.types.Object]:
-        """Write a mesh, or points of one material, as an object of the collection, step by step.
-
-        It is of one species, or of None, and of a look.
-        """
+        """Write a mesh, or points of one material, as an object of a species or None, and of a look, step by step."""
         self.use(materials)
         name = self.name_for(name)
         if isinstance(buffers, PointBuffers):

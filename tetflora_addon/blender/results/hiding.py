@@ -218,10 +218,7 @@ def adopt_copies() -> None:
 
 
 def hidden_originals(scene: Scene, purpose: str | None = None) -> list[Object]:
-    """Objects that are hidden for a scene's results, or for results that no longer exist.
-
-    They may not be in the scene any more.
-    """
+    """Objects hidden for a scene's results, or for results that are gone; they may be in the scene no more."""
     purposes = HIDDEN if purpose is None else [purpose]
     marked = [o for which in purposes for o in _marked(which) if _concerns(scene, o, which)]
     return marked + [o for which in purposes for o in linked_hidden(scene, which)]

@@ -105,10 +105,7 @@ def dress_collection(scene: bpy.types.Scene, collection: bpy.types.Collection) -
 
 
 def mark_runtime(collection: bpy.types.Collection, runtime: bool) -> None:
-    """Set whether Blender leaves a result collection and its contents out of files.
-
-    Objects in other collections too, and meshes with other users, stay in.
-    """
+    """Keep a result collection out of files, or not; objects in other collections too, and shared meshes, stay in."""
     collection.is_runtime_data = runtime
     for obj in collection.objects:
         if is_own(obj) and (len(obj.users_collection) == 1 or not runtime):

@@ -60,10 +60,7 @@ _QUICK = 0.3  # seconds that reading may take for plants to follow the timeline 
 
 @job("Compute Levels")
 def level_steps(data: JobData) -> Generator[Progress, None, Levels]:
-    """Refine a scene without making anything, and keep all levels for viewports; closing it changes nothing.
-
-    Errors are those of `job.refine_steps`.
-    """
+    """Refine a scene and make only levels for viewports; closing it changes nothing. Errors are `refine_steps`'."""
     scene, depsgraph = data.scene, data.depsgraph
     data.add_objects([*taking_part(scene), *([] if scene.camera is None else [scene.camera])])
     yield Progress(0.0, "Reading the scene")

@@ -300,15 +300,9 @@ def lines_of(scene: bpy.types.Scene, preview: Preview) -> list[tuple[str, tuple[
         level = preview.levels.at(settings.level)
         figures, last = level.figures, preview.levels.levels[-1].number
         lines.append((f"Level {level.number} of {last}   {len(level):,} tetrahedra with plants", _TEXT))
-        parts = (
-            (Decision.EXPLICIT, "explicit", figures.explicit),
-            (Decision.PROXY, "proxies", figures.proxy),
-            (Decision.HIDDEN, "hidden", figures.hidden),
-            (Decision.SPLIT, "to split", figures.split),
-        )
-        for decision, name, number in parts:
-            color = (*FORMS[decision], 1.0) if settings.color == 'FORM' else _TEXT
-            lines.append((f"    {number:,} {name}", color))
+        for name, text in {"explicit": "explicit", "proxy": "proxies", "hidden": "hidden", "split": "to split"}.items():
+            color = (*FORMS[Decision[name.upper()]], 1.0) if settings.color == 'FORM' else _TEXT
+            lines.append((f"    {getattr(figures, name):,} {text}", color))
         lines.append((f"    {figures.polygons:,} explicit polygons", _TEXT))
         if settings.color != 'FORM' and settings.wires:
             lines.append(("    dark: low    bright: high", _TEXT))
