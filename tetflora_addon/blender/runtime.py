@@ -286,13 +286,7 @@ class GoneError(SceneError):
 
 
 class JobData:
-    """What a job needs from its first step to its last.
-
-    Parameters
-    ----------
-    depsgraph : bpy.types.Depsgraph
-        It goes with its view layer, and using it then would crash Blender.
-    """
+    """What a job needs until its last step; a dependency graph goes with its view layer, or would crash Blender."""
 
     def __init__(self, job: str, scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
         self.job, self.scene, self.depsgraph, self._reason = job, scene, depsgraph, ""

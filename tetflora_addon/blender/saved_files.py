@@ -43,12 +43,7 @@ def cut_off(path: Path) -> bool:
 
 
 def write_blend(path: Path, write: Callable[[str], object]) -> None:
-    """Let Blender write a .blend beside its place, and move it there when it is complete.
-
-    Parameters
-    ----------
-    write : callable
-        Gets the path to write to.
+    """Let Blender write a .blend to a path beside its place, and move it there when it is complete.
 
     Raises
     ------

@@ -61,12 +61,7 @@ def scene_digest(
 ) -> str:
     """Digest of camera, plants, meshes, assets, occluders, lights, settings, species, materials, day and wind.
 
-    In the wind it changes with each frame.
-
-    Parameters
-    ----------
-    camera : Camera, optional
-        Instead of the scene's current one.
+    In the wind it changes with each frame. The camera is the scene's, and the contents are read, if none are given.
 
     Raises
     ------

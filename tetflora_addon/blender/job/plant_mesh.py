@@ -79,14 +79,9 @@ def plant_mesh(scene: bpy.types.Scene, name: str, species: Species, parts: list[
 
 @job("Convert Plants to Meshes")
 def make_plant_mesh_steps(data: JobData, plants: Iterable[bpy.types.Object]) -> Job[list[bpy.types.Object]]:
-    """Make ordinary mesh objects of plants, in their places and collections; the plants are disabled, not deleted.
+    """Make a mesh object of each plant, in their order, places and collections; they are disabled, not deleted.
 
     A step for each plant; closing the generator early removes what was made.
-
-    Returns
-    -------
-    list of bpy.types.Object
-        In the order of the plants, each with a mesh of its own.
 
     Raises
     ------

@@ -463,14 +463,7 @@ def refine(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, **options: An
 
 
 def clear(scene: bpy.types.Scene, for_render: bool | None = None) -> int:
-    """Remove only what refinement made for a scene; how many datablocks that was.
-
-    Parameters
-    ----------
-    for_render : bool, optional
-        Only what was made for a render (True), only what the artist made (False), or both (None).
-
-    """
+    """Remove only what was made for a render (True), by the artist (False) or both (None); how many datablocks."""
     removed = remove_results(scene, {None: None, True: 'RENDER', False: 'VIEW'}[for_render])
     if not for_render:
         scene.tetflora.statistics = ""

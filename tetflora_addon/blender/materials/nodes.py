@@ -128,14 +128,9 @@ Build = Callable[["Graph", Terms], dict[str, Any]]
 
 
 class Graph:
-    """A node tree under construction.
+    """A node tree under construction, which is emptied first if it is to be fresh.
 
     Sockets are found by identifier or, of groups, by name: identifiers stayed where 5.x renamed "Fac" to "Factor".
-
-    Parameters
-    ----------
-    fresh : bool
-        Whether it is emptied first.
     """
 
     def __init__(self, tree: bpy.types.NodeTree, fresh: bool = True) -> None:

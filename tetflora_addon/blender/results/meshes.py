@@ -138,12 +138,7 @@ def _check_range(key: str, indices: NDArray, count: int) -> None:
 
 
 def point_object(name: str, buffers: PointBuffers, material: bpy.types.Material) -> bpy.types.Object:
-    """Make an object of points that render as spheres, not linked to any collection.
-
-    Returns
-    -------
-    bpy.types.Object
-        Its data is a point cloud, or a mesh with a modifier.
+    """Make an object of points that render as spheres, a point cloud or a mesh with a modifier, in no collection.
 
     Raises
     ------

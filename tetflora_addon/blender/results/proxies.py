@@ -25,13 +25,7 @@ from .proxy_kinds import ProxyKind, proxy_kind_of
 
 
 class Baking:
-    """Baked light of one refinement: `add` all polygons, then `add_facets`, then `look`.
-
-    Parameters
-    ----------
-    leaves : bool
-        Whether real leaves, blossoms and bark get baked light as well.
-    """
+    """Baked light of one refinement, of leaves and bark too where asked: `add` all polygons, `add_facets`, `look`."""
 
     def __init__(self, sources: Sources, leaves: bool) -> None:
         self.sources, self.leaves = sources, leaves
