@@ -188,16 +188,8 @@ def result_collections(scene: bpy.types.Scene, purpose: str | None = None) -> li
         other = bpy.data.collections.get((one[MADE], None))
         return other not in {None, one} and (other in inside or not {*one.objects}.isdisjoint(other.objects))
 
-    return [
-        c
-        for c in inside
-        if PURPOSE in c
-        and MADE in c
-        and (purpose is None or c[PURPOSE] == purpose)
-        and c.library is None
-        and c.override_library is None
-        and not copied(c)
-    ]
+    marked = [c for c in inside if PURPOSE in c and MADE in c and c.library is None and c.override_library is None]
+    return [c for c in marked if purpose in {None, c[PURPOSE]} and not copied(c)]
 
 
 def megabytes_held(purpose: str, scene: bpy.types.Scene | None = None) -> float:

@@ -80,11 +80,9 @@ def level_steps(data: JobData) -> Generator[Progress, None, Levels]:
     states = refine_loop(flora, given.seeds, camera, settings, *others)
     # Nobody knows how many passes will follow.
     fractions = (1.0 - 0.95 * 0.85**number for number in count(1))
-    shown = mapped(
-        gather(states, flora, camera),
-        lambda one: Progress(next(fractions), f"Level {one.number}: {len(one):,} tetrahedra"),
-    )
-    levels = yield from steps_in_thread(shown, Progress(0.05, "Level 0"))
+    steps = gather(states, flora, camera)
+    told = mapped(steps, lambda one: Progress(next(fractions), f"Level {one.number}: {len(one):,} tetrahedra"))
+    levels = yield from steps_in_thread(told, Progress(0.05, "Level 0"))
     data.check()
     preview = of(scene)
     preview.levels, preview.looked = levels, looked

@@ -249,14 +249,10 @@ def _draw_levels(preview: Preview, settings: TetFloraPreview, space: bpy.types.S
     gpu.state.depth_test_set('LESS_EQUAL')
     gpu.state.depth_mask_set(False)  # clouds hide nothing
     if settings.projected:
-        view = tuple(np.array(space.region_3d.view_matrix).ravel().round(7)), space.region_3d.is_perspective
-        overlay = _kept(
-            preview,
-            f"projected {space.as_pointer()}",
-            (*shown, *view),
-            lambda: _made_in_time(preview, level, forms, view_camera(space.region_3d, space.clip_start, origin)),
-        )
-        _draw(overlay, origin)
+        region, name = space.region_3d, f"projected {space.as_pointer()}"
+        view = tuple(np.array(region.view_matrix).ravel().round(7)), region.is_perspective
+        camera = view_camera(region, space.clip_start, origin)
+        _draw(_kept(preview, name, (*shown, *view), lambda: _made_in_time(preview, level, forms, camera)), origin)
     if settings.wires:
         overlay = _kept(preview, "wires", (*shown, settings.color), lambda: wires(levels, level, settings.color, forms))
         _draw(overlay, origin)
