@@ -128,10 +128,7 @@ def _draw_levels(layout: bpy.types.UILayout, scene: bpy.types.Scene) -> None:
 
 @lru_cache(maxsize=8)
 def rows_of(text: str) -> tuple[tuple[str, str], ...]:
-    """Rows of the table, (name, value), from the stored JSON; none if there is none or it is not ours.
-
-    Cached, because a panel is drawn at every movement of the mouse.
-    """
+    """Rows of the table, (name, value), from the stored JSON, for each redraw; none if there is none that is ours."""
     try:
         figures = json.loads(text)
         seconds = figures["seconds"]

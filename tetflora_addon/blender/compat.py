@@ -55,10 +55,7 @@ def sky_model(node: bpy.types.ShaderNodeTexSky) -> str:
 
 
 def disable_bump_correction(material: bpy.types.Material) -> None:
-    """Keep Cycles from darkening a material's custom normals as if they were bump maps.
-
-    The setting belongs to the Cycles add-on; without it there is nothing to correct.
-    """
+    """Keep Cycles, where its add-on is on, from darkening a material's custom normals as if they were bump maps."""
     cycles = getattr(material, "cycles", None)
     if cycles is not None and hasattr(cycles, "use_bump_map_correction"):
         cycles.use_bump_map_correction = False

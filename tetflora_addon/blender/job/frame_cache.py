@@ -152,10 +152,7 @@ def _around(scene: Scene, depsgraph: Depsgraph, given: SceneContents) -> Around:
 
 
 def camera_moves(scene: Scene) -> bool:
-    """Whether anything may move a scene's camera or change its lens from frame to frame.
-
-    It depends on the file alone, so that a frame is refined in the same way within an animation and alone.
-    """
+    """Whether anything in the file, whichever frames are rendered, may move a scene's camera or change its lens."""
     carrier = scene.camera
     if carrier is not None and is_animated(carrier.data):
         return True

@@ -57,10 +57,7 @@ def plant_parts(flora: Flora, seeds: Seeds) -> list[Part]:
 
 
 def plant_mesh(scene: bpy.types.Scene, name: str, species: Species, parts: list[Part]) -> bpy.types.Mesh:
-    """One mesh of the parts of a plant (`plant_parts`), in its own space, with the materials of Refine.
-
-    Wood is shaded smooth, leaves flat. The scene's leaf objects and output settings count.
-    """
+    """One mesh of the parts of a plant (`plant_parts`) with the materials of Refine; wood is smooth, leaves flat."""
     numbered, materials = [], []
     for kind, form, buffers in parts:
         _, index = buffers.attributes.get("material_index", ("", np.zeros(buffers.polygons, dtype=np.int32)))

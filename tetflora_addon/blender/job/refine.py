@@ -222,10 +222,7 @@ def _write_clusters(
 def _write_blocks(
     run: _Run, blocks: Iterator[int | Block | Buffers], start: float, write_proxy: ProxyWriter | None = None
 ) -> Job[None]:
-    """Write blocks of plants; progress goes from a given fraction to .95, and the statistics count.
-
-    The number of a tile comes before its blocks, and its proxies among them.
-    """
+    """Write blocks of plants, of a tile after its number; progress goes from a fraction to .95, statistics count."""
     materials: dict[tuple[int, str, int], list[bpy.types.Material]] = {}
     progress = Progress(start, "Making polygons")
 

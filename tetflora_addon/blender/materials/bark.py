@@ -229,10 +229,7 @@ def pattern_part(graph: Graph, character: str, place: Place) -> dict[str, Term]:
 
 
 def _grown(graph: Graph, given: dict[str, Term]) -> dict[str, Term]:
-    """Group "TetFlora Bark Growth" of all barks: moss where it is damp, lichen where a noise is low.
-
-    Both are as light as the bark beneath, so that the mean stays.
-    """
+    """Group "TetFlora Bark Growth": moss where damp, lichen where a noise is low, both as light as the bark beneath."""
     age, color = given["Age"], given["Color"]
     radii = given["Girth"] / tau
     noise = graph.noise(given["Round"] * (radii * _PATCHES), 4.0, 0.65)[0]
@@ -413,10 +410,7 @@ def papery(graph: Graph, place: Place) -> tuple[Term, Term]:
 
 
 def _plates(graph: Graph, place: Place) -> tuple[Term, Term, Term, Term]:
-    """Long plates of flakes that lie in layers, each its own red-brown or gray, with dark fissures between.
-
-    Color, height, part of a flake from its rim, and a fine noise.
-    """
+    """Long plates of flakes, dark fissures between: color, height, part of a flake from its rim, and a fine noise."""
     noise, wave = graph.noise(times(place.cells, 0.9, 1.5), 3.0, 0.62)
     where = bent(place.cells, wave, 1.0, 0.6)
     plate = cell(graph, where)

@@ -43,10 +43,7 @@ def is_ours(datablock: bpy.types.ID) -> bool:
 
 
 def is_own(datablock: bpy.types.ID) -> bool:
-    """Whether TetFlora may change or remove a datablock: it is ours, and of this file.
-
-    What TetFlora made in another file is linked here by the artist, as itself or as a library override.
-    """
+    """Whether TetFlora may change or remove a datablock: it is ours, of this file, neither linked nor an override."""
     return is_ours(datablock) and datablock.library is None and datablock.override_library is None
 
 
@@ -165,10 +162,7 @@ class Graph:
             socket.default_value = value
 
     def part(self, name: str, version: int, given: Terms, outputs: Sockets, build: Build) -> Terms:
-        """Outputs of a `node_group` that is fed with terms.
-
-        Blender looks through a whole tree after each change: two trees of half the nodes are built in half the time.
-        """
+        """Outputs of a `node_group` fed with terms; Blender builds two trees of half the nodes in half the time."""
         inputs = [(key, 'Vector' if term.is_vector else 'Float') for key, term in given.items()]
         return self.outputs("ShaderNodeGroup", given, node_tree=node_group(name, version, inputs, outputs, build))
 

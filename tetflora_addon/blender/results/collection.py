@@ -203,10 +203,7 @@ class Results:
         self.tiles.setdefault(self.tile, []).append(obj)
 
     def finish(self) -> None:
-        """Everything is made and earlier results are gone, whose names these take.
-
-        The output settings decide about the artist's results; files never hold a render's.
-        """
+        """Everything is made and earlier results are gone, whose names these take; output settings now count."""
         for obj, species in self._waiting:
             self._place(obj, species)
         self._waiting.clear()

@@ -207,10 +207,7 @@ def release_copies(collection: bpy.types.Collection) -> None:
 
 
 def remove_collection(scene: bpy.types.Scene | None, collection: bpy.types.Collection) -> int:
-    """Remove a result collection, linked to a scene or not; returns the number of datablocks removed.
-
-    The artist's own objects in it stay in the scene, if that is there.
-    """
+    """Remove a result collection, but leave the artist's objects in the scene, if given; how many datablocks went."""
     objects = list(collection.objects)
     ours = [o for o in objects if is_own(o) and not (o.get(KIND) == PARENT and len(o.users_collection) > 1)]
     if scene is not None:

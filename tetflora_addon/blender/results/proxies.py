@@ -89,10 +89,7 @@ ProxyWriter = Callable[[Buffers], Generator[None, None, Progress]]
 def proxy_writer(
     results: Results, form: ProxyKind, refined: EmissionInput, statistics: Statistics, baked: bool = False
 ) -> ProxyWriter:
-    """What makes objects of the buffers of proxies; the statistics get the number of faces or points, and their memory.
-
-    They are numbered by their tiles, or where there are none one after the other.
-    """
+    """What makes objects of proxies, numbered by tile or in order; the statistics get faces or points, and memory."""
     numbers = count()
 
     def write(buffers: Buffers) -> Generator[None, None, Progress]:
