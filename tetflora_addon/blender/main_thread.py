@@ -69,7 +69,7 @@ def sync_view_layers() -> None:
 
 
 def in_main_thread(function: Callable[[], _Result] = sync_view_layers) -> _Result:
-    """Call a function in Blender's main thread, and wait for its result; by default until what that does is done.
+    """Call a function in Blender's main thread, and wait for its result; by default until that thread is free.
 
     At once in the main thread itself, and without a window. Errors of the function are raised here.
 

@@ -286,7 +286,7 @@ class GoneError(SceneError):
 
 
 class JobData:
-    """What a job needs until its last step; a dependency graph goes with its view layer, or would crash Blender."""
+    """What a job needs until its last step; once its view layer is gone, the dependency graph would crash Blender."""
 
     def __init__(self, job: str, scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
         self.job, self.scene, self.depsgraph, self._reason = job, scene, depsgraph, ""

@@ -39,7 +39,7 @@ MONTHS = (
 
 
 def properties_of(settings: type, **common: Any) -> SimpleNamespace:
-    """Properties by name, to annotate a group with, of fields by `parameters.setting`, all with some common options."""
+    """Annotations of a property group, by name, for fields that `parameters.setting` declares, with common options."""
     properties = SimpleNamespace()
     for f in fields(settings):
         if f.metadata:

@@ -390,7 +390,7 @@ FaceLooks = dict[str, NDArray[np.float16]]
 
 
 class FaceReader:
-    """Reads looks of faces, and keeps means and, as memory allows, images, at ``most`` as large as of `_pyramid_of`."""
+    """Reads looks of faces; keeps means, and images of ``most`` columns or rows (`_pyramid_of`) as memory allows."""
 
     def __init__(self, most: int = MOST_TEXELS) -> None:
         self.warnings: list[str] = []  # what the artist should know, each once
