@@ -172,10 +172,7 @@ def counted(number: int, what: str) -> str:
 
 
 class ModalJob(Reporting):
-    """Mix-in for operators: `steps` yields progress and returns what `finish` reports.
-
-    Closing the steps leaves everything as it was.
-    """
+    """Mix-in for operators: `steps` yields progress, returns what `finish` reports, and if closed changes nothing."""
 
     #: What is reported after Esc, and the status bar's text about keys.
     cancelled = "Cancelled; the scene is unchanged"

@@ -31,15 +31,11 @@ def can_be_field(obj: bpy.types.Object | None) -> bool:
     return obj is not None and (obj.type in FIELD_TYPES or obj.tetflora.is_field)
 
 
+_NO_SURFACE = "Select meshes, or objects that instance them, first"
 #: Properties of objects that are marks, which objects may bear them, and what is said where none may and of others.
 _MARKS = {
     'OCCLUDER': ("is_occluder", lambda obj: obj.type == 'MESH', "Select meshes first", "{} marked as occluder"),
-    'EXPLICIT': (
-        "is_explicit",
-        can_be_explicit,
-        "Select meshes, or objects that instance them, first",
-        "{} will be refined",
-    ),
+    'EXPLICIT': ("is_explicit", can_be_explicit, _NO_SURFACE, "{} will be refined"),
 }
 
 

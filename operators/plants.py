@@ -104,12 +104,9 @@ class TETFLORA_OT_remove_plants(Reporting, Operator, label="Remove Plants", told
         if (plants or fields) and not local:
             return self.refused(f"{LINKED}; nothing removed")
         if not local:
-            none = {
-                'SELECTED': "Select plants first",
-                'SPECIES': f'The scene has no plants of species "{self.species}"',
-                'ALL': "The scene has no plants",
-            }
-            return self.refused(f"{none[self.which]}; nothing removed")
+            none = "Select plants first" if self.which == 'SELECTED' else "The scene has no plants"
+            of = f' of species "{self.species}"' if self.which == 'SPECIES' else ""
+            return self.refused(f"{none}{of}; nothing removed")
         number = plant_objects.remove_plants(plants) + plant_objects.remove_fields(fields)
         for layer in context.scene.tetflora.layers:  # some of its plants may be gone
             layer.made = own_number(own_objects(context.scene, layer))

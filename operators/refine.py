@@ -57,27 +57,22 @@ class TETFLORA_OT_refine(base.ModalJob, Operator, label="Refine", needs=(base.in
                 raise
 
     def finish(self, context: Context, statistics: Statistics) -> set[str]:
-        prepare_scene(context.scene)
+        scene = context.scene
+        prepare_scene(scene)
         if statistics.complete:
-            auto.refined(context.scene)
+            auto.refined(scene)
         failed_frames.clear()
         redraw()
-        self.report({'INFO'}, _made(context.scene, statistics))
+        self.report({'INFO'}, _made(scene, statistics))
         if not statistics.complete and statistics.passes:
             self.report({'INFO'}, "Stopped early; click Refine again to complete the result")
-        outside = cut_off(context.scene)[0] or _unseen(context.scene, statistics)
+        outside = cut_off(scene)[0] or _unseen(scene, statistics)
         # The first warnings, and how many more there are.
         more = len(asset_warnings) - _WARNINGS
-        for warning in (
-            *([*asset_warnings[:_WARNINGS], f"{more:,} more warnings about assets"] if more > 1 else asset_warnings),
-            statistics.left_out,
-            statistics.coarser,
-            outside,
-            few_bounces(context.scene),
-            _unread_world(context.scene),
-        ):
-            if warning:
-                self.report({'WARNING'}, warning)
+        told = [*asset_warnings[:_WARNINGS], f"{more:,} more warnings about assets"] if more > 1 else asset_warnings
+        others = statistics.left_out, statistics.coarser, outside, few_bounces(scene), _unread_world(scene)
+        for warning in filter(None, (*told, *others)):
+            self.report({'WARNING'}, warning)
         return {'FINISHED'}
 
 

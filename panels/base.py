@@ -141,16 +141,12 @@ def draw_where(layout: UILayout, owner: PropertyGroup) -> None:
         layout.prop(owner, "scale_at_top")
     if 'FACING' in shown:
         draw_numbers(layout, owner, "aspect_range")
-    if 'EDGE' in shown:
-        layout.prop(owner, "edge_falloff")
-    if 'AREAS' in shown:
-        layout.prop(owner, "areas")
-    if 'PATHS' in shown:
-        layout.prop(owner, "paths")
-        if biome:
-            draw_numbers(layout, owner, "path_range", 3)
-        else:
-            layout.prop(owner, "path_distance")
+    others = {'EDGE': "edge_falloff", 'AREAS': "areas", 'PATHS': "paths"}
+    draw_properties(layout, owner, *(name for limit, name in others.items() if limit in shown))
+    if 'PATHS' in shown and biome:
+        draw_numbers(layout, owner, "path_range", 3)
+    elif 'PATHS' in shown:
+        layout.prop(owner, "path_distance")
 
 
 def _draw_search(layout: UILayout, owner: PropertyGroup, name: str, place: ID | None, names: str) -> None:

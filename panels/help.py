@@ -6,11 +6,13 @@ Pages are those of the website in the manifest; while that is a placeholder, cop
 """
 
 import tomllib
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
 
 import bpy
+from bpy import utils
 
+from ..tetflora_addon.blender.runtime import Part
 from ..tetflora_addon.files import beside
 
 _ROOT = Path(__file__).resolve().parent.parent
@@ -42,11 +44,5 @@ def _map() -> tuple[str, tuple[tuple[str, str], ...]]:
     return base(), PAGES
 
 
-def register() -> None:
-    """Tell Blender the pages of settings and operators."""
-    bpy.utils.register_manual_map(_map)
-
-
-def unregister() -> None:
-    """Take them back."""
-    bpy.utils.unregister_manual_map(_map)
+#: For the pages of settings and operators, which Blender opens.
+register, unregister = Part(*(partial(tell, _map) for tell in (utils.register_manual_map, utils.unregister_manual_map)))

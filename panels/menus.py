@@ -11,36 +11,28 @@ from .base import Button, draw_buttons, menu, thumbnail
 from .layers import FALLBACK_ICON, IMPORTS, TETFLORA_MT_add_biome, TETFLORA_MT_layers
 
 
-def _draw_catalog(layout: bpy.types.UILayout, operator: str) -> None:
-    """An entry for each species of the catalog, which calls an operator with it."""
-    # Menus execute operators by default; tools need the mouse, and the others have nothing to ask.
-    layout.operator_context = 'INVOKE_DEFAULT'
-    known = catalog()
-    for info in known.values():
-        icon = thumbnail(info.identifier)
-        layout.operator(f"tetflora.{operator}", text=info.name, **icon).species = info.identifier
-        if info.identifier == FIRST:  # the others follow by name
-            layout.separator()
-    if not known:
-        layout.label(text="The catalog has no species", icon='ERROR')
+def _catalog_menu(name: str, label: str, operator: str) -> type[bpy.types.Menu]:
+    """A menu with an entry for each species of the catalog, which calls an operator with it."""
+
+    def draw(layout: bpy.types.UILayout, _context: bpy.types.Context) -> None:
+        # Menus execute operators by default; tools need the mouse, and the others have nothing to ask.
+        layout.operator_context = 'INVOKE_DEFAULT'
+        known = catalog()
+        for info in known.values():
+            icon = thumbnail(info.identifier)
+            layout.operator(f"tetflora.{operator}", text=info.name, **icon).species = info.identifier
+            if info.identifier == FIRST:  # the others follow by name
+                layout.separator()
+        if not known:
+            layout.label(text="The catalog has no species", icon='ERROR')
+
+    draw.__name__ = f"TETFLORA_MT_{name}"
+    return menu(label)(draw)
 
 
-@menu("Change Species")
-def TETFLORA_MT_species(layout: bpy.types.UILayout, _context: bpy.types.Context) -> None:
-    """Species to assign to the selected plants."""
-    _draw_catalog(layout, "assign_species")
-
-
-@menu("TetFlora Plant")
-def TETFLORA_MT_add_plant(layout: bpy.types.UILayout, _context: bpy.types.Context) -> None:
-    """Species to add a plant of."""
-    _draw_catalog(layout, "add_plant")
-
-
-@menu("Place Plants by Clicking")
-def TETFLORA_MT_place_plant(layout: bpy.types.UILayout, _context: bpy.types.Context) -> None:
-    """Species to place by clicking on the ground."""
-    _draw_catalog(layout, "place_plant")
+TETFLORA_MT_species = _catalog_menu("species", "Change Species", "assign_species")
+TETFLORA_MT_add_plant = _catalog_menu("add_plant", "TetFlora Plant", "add_plant")
+TETFLORA_MT_place_plant = _catalog_menu("place_plant", "Place Plants by Clicking", "place_plant")
 
 
 _POPULATE = Button("populate", 'OUTLINER_OB_POINTCLOUD', "Scatter Plants")

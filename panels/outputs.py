@@ -128,23 +128,16 @@ def _draw_levels(layout: bpy.types.UILayout, scene: bpy.types.Scene) -> None:
 
 @lru_cache(maxsize=8)
 def rows_of(text: str) -> tuple[tuple[str, str], ...]:
-    """Rows of the table, (name, value), from the stored JSON; none if there is none or it is not ours.
-
-    Cached, because a panel is drawn at every movement of the mouse.
-    """
+    """Rows of the table, (name, value), from the stored JSON, for each redraw; none if there is none that is ours."""
     try:
         figures = json.loads(text)
         seconds = figures["seconds"]
         full = figures["polygons_full"]
         fraction = f"{figures['polygons_meshed'] / full:.1%}" if full else "–"
-        instances = (
-            ("Instances", "instances"),
-            ("    Originals", "instances_whole"),
-            ("    Clusters", "instances_clusters"),
-        )
+        instances = {"Instances": "instances", "    Originals": "instances_whole", "    Clusters": "instances_clusters"}
         return (
             ("Plants", f"{figures['plants']:,}"),
-            *((name, f"{figures[key]:,}") for name, key in instances if figures.get("instances")),
+            *((name, f"{figures[key]:,}") for name, key in instances.items() if figures.get("instances")),
             ("Polygons If Expanded", f"{full:,}"),
             ("Polygons", f"{figures['polygons_meshed']:,}"),
             ("    Fraction of All", fraction),

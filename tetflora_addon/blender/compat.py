@@ -55,10 +55,7 @@ def sky_model(node: bpy.types.ShaderNodeTexSky) -> str:
 
 
 def disable_bump_correction(material: bpy.types.Material) -> None:
-    """Keep Cycles from darkening a material's custom normals as if they were bump maps.
-
-    The setting belongs to the Cycles add-on; without it there is nothing to correct.
-    """
+    """Keep Cycles, where its add-on is on, from darkening a material's custom normals as if they were bump maps."""
     cycles = getattr(material, "cycles", None)
     if cycles is not None and hasattr(cycles, "use_bump_map_correction"):
         cycles.use_bump_map_correction = False
@@ -88,10 +85,7 @@ def blend_in_mesh_order(material: bpy.types.Material) -> None:
 
 
 def drawn_disc(engine: str) -> float:
-    """Area that a renderer draws for a point of radius 1 of a point cloud.
-
-    EEVEE draws a square that stands on its corner, within the circle that Cycles draws.
-    """
+    """Area drawn for a point of radius 1 of a point cloud: EEVEE draws a square in the circle that Cycles draws."""
     return 2.0 if engine in EEVEE_ENGINES else pi
 
 

@@ -69,14 +69,9 @@ def sync_view_layers() -> None:
 
 
 def in_main_thread(function: Callable[[], _Result] = sync_view_layers) -> _Result:
-    """Call a function in Blender's main thread, and wait for its result.
+    """Call a function in Blender's main thread, and wait for its result; by default until that thread is free.
 
     At once in the main thread itself, and without a window. Errors of the function are raised here.
-
-    Parameters
-    ----------
-    function : callable
-        By default `sync_view_layers`: what the main thread was doing is done then.
 
     Raises
     ------

@@ -40,6 +40,7 @@ _SKELETON = partial(
 _AUTO_REFINE = {**FIXED, "update": lambda self, _context: auto_refine_switched.notify(self.id_data)}
 #: What overrides of linked objects may change; otherwise Blender forgets the change when the file is opened again.
 _OVERRIDES = {'LIBRARY_OVERRIDABLE'}
+_MARK = {**FIXED, "override": _OVERRIDES}
 
 
 def _on_age(self: bpy.types.PropertyGroup, _context: bpy.types.Context) -> None:
@@ -64,10 +65,7 @@ class TetFloraFieldEntry(bpy.types.PropertyGroup, SpeciesChoice):
 
 
 class TetFloraObject(bpy.types.PropertyGroup, SpeciesChoice):
-    """A plant is a species, a transform and a seed; nothing else is stored (paper, section 5).
-
-    A field is an object whose points are plants.
-    """
+    """A plant is a species, a transform and a seed (paper, section 5); a field is an object whose points are plants."""
 
     version: integer("Version", "Layout of these properties", **HIDDEN)
     is_plant: boolean(
@@ -115,23 +113,20 @@ class TetFloraObject(bpy.types.PropertyGroup, SpeciesChoice):
         "Occluder",
         "Plants behind this mesh count as hidden and cost next to nothing. Use it for terrain and buildings, not "
         "for transparent or very thin objects",
-        **FIXED,
-        override=_OVERRIDES,
+        **_MARK,
     )
     is_explicit: boolean(
         "Refine This Mesh",
         "Refine the object's own polygons with the plants: kept where they are near, drawn as proxies where they are "
         "far or hidden. Use it for trees from other sources, rocks and scans, and for objects that instance them",
-        **FIXED,
-        override=_OVERRIDES,
+        **_MARK,
     )
     is_scatter: boolean(
         "Refine Scatter",
         "Refine what the object's modifiers or particles scatter: instances stay as they are where they are near, and "
         "become proxies where they are far or hidden. The object goes on scattering by its own rules, and its own "
         "surface stays as it is",
-        **FIXED,
-        override=_OVERRIDES,
+        **_MARK,
     )
     population: string("Population", "Identity of the population that created this", **HIDDEN)
     population_number: integer("Number in the Population", "Copies made by hand share it", **HIDDEN)

@@ -114,10 +114,7 @@ def call_soon(function: Callable[[], float | None], seconds: float) -> None:
 
 
 def call_off(function: Callable[[], float | None]) -> None:
-    """Cancel a request of `call_soon`.
-
-    Do so before a file is loaded as well: Blender 4.5's wheel hangs at exit if Blender itself dropped the timer.
-    """
+    """Cancel a request of `call_soon`; also before a load, as 4.5's wheel hangs at exit if Blender drops the timer."""
     if bpy.app.timers.is_registered(timer := _after_renders(function)):
         bpy.app.timers.unregister(timer)
 
@@ -207,10 +204,7 @@ class Outlook(Generic[_Result]):
 
 @dataclass(eq=False)
 class SceneSwitch:
-    """What a switch of the window shows of one scene, made anew a moment after each change.
-
-    It belongs to the session, and is forgotten when a file is loaded.
-    """
+    """What a switch of the window shows of one scene in this session, made anew a moment after each change."""
 
     #: name, label, tooltip: Of the switch, a property of the window manager
     name: str
@@ -292,13 +286,7 @@ class GoneError(SceneError):
 
 
 class JobData:
-    """What a job needs from its first step to its last.
-
-    Parameters
-    ----------
-    depsgraph : bpy.types.Depsgraph
-        It goes with its view layer, and using it then would crash Blender.
-    """
+    """What a job needs until its last step; once its view layer is gone, the dependency graph would crash Blender."""
 
     def __init__(self, job: str, scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
         self.job, self.scene, self.depsgraph, self._reason = job, scene, depsgraph, ""

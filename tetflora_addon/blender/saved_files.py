@@ -43,12 +43,7 @@ def cut_off(path: Path) -> bool:
 
 
 def write_blend(path: Path, write: Callable[[str], object]) -> None:
-    """Let Blender write a .blend beside its place, and move it there when it is complete.
-
-    Parameters
-    ----------
-    write : callable
-        Gets the path to write to.
+    """Let Blender write a .blend to a path beside its place, and move it there when it is complete.
 
     Raises
     ------
@@ -147,10 +142,7 @@ def clear_unreadable() -> None:
 
 
 def migrate() -> None:
-    """Stamp all plants, fields, occluders and scenes of the open file with the version of this layout.
-
-    Data of a newer TetFlora stays as it is and is reported on stderr. Linked data belongs to another file.
-    """
+    """Stamp the open file's own data with the version of this layout; data of a newer one is reported on stderr."""
     owners = [o for o in bpy.data.objects if o.tetflora.is_plant or o.tetflora.is_field or o.tetflora.is_occluder]
     owners += [s for s in bpy.data.scenes if s.is_property_set("tetflora")]
     newer = 0

@@ -39,18 +39,7 @@ MONTHS = (
 
 
 def properties_of(settings: type, **common: Any) -> SimpleNamespace:
-    """A property for each field of a dataclass that is declared with `parameters.setting`.
-
-    Parameters
-    ----------
-    **common
-        Further options of all of them, as ``options`` and ``update``.
-
-    Returns
-    -------
-    SimpleNamespace
-        The properties by the fields' names, to be used as annotations of a property group.
-    """
+    """Annotations of a property group, by name, for fields that `parameters.setting` declares, with common options."""
     properties = SimpleNamespace()
     for f in fields(settings):
         if f.metadata:
@@ -132,13 +121,7 @@ def active_in(owner: bpy.types.PropertyGroup, entries: str) -> bpy.types.Propert
 
 
 def switches(name: str, description: str, properties: dict[str, Any]) -> type:
-    """A mix-in with Boolean properties, which are hidden, and one by which artists see them side by side.
-
-    Parameters
-    ----------
-    name : str
-        Identifier of that; in title case its label.
-    """
+    """A mix-in with hidden Boolean properties, and one, labeled by its name, in which artists see them side by side."""
     said = [one.keywords for one in properties.values()]
 
     def store(group: bpy.types.PropertyGroup, bits: int) -> None:
@@ -184,15 +167,10 @@ def check_limits(group: bpy.types.PropertyGroup, owner: str) -> None:
 
     Scripts that write custom properties, and files, can store them past Blender's checks, and Blender accepts nan.
 
-    Parameters
-    ----------
-    owner : str
-        Named in the message.
-
     Raises
     ------
     SceneError
-        Names the setting, its value and the limits.
+        Names the owner, the setting, its value and the limits.
     """
     for prop in group.bl_rna.properties:
         if prop.type not in {'INT', 'FLOAT', 'ENUM'} or not group.is_property_set(prop.identifier):

@@ -9,9 +9,10 @@ import json
 import sys
 from pathlib import Path
 
-import bpy
+from bpy.app import translations
 
 from ..errors import TetFloraError
+from .runtime import Part
 
 FOLDER = Path(__file__).with_name("locale")
 CONTEXTS = ("Operator", "*")
@@ -49,11 +50,6 @@ def read_languages(folder: Path = FOLDER) -> dict[str, Entries]:
     return languages
 
 
-def register() -> None:
-    """Add the translations to Blender's."""
-    bpy.app.translations.register(__name__, read_languages())
-
-
-def unregister() -> None:
-    """Remove them."""
-    bpy.app.translations.unregister(__name__)
+register, unregister = Part(
+    lambda: translations.register(__name__, read_languages()), lambda: translations.unregister(__name__)
+)

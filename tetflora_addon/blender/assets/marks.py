@@ -89,17 +89,9 @@ def _read_one(mesh: bpy.types.Mesh, materials: list[bpy.types.Material | None], 
     coverage = np.array([look.coverage for look in seen])[slot]
     # Of closed leaves both sides have area; each edge of theirs has two faces.
     loose = min(max(2.0 * len(mesh.edges) / len(mesh.loops) - 1.0, 0.0), 1.0)
-    return _Mesh(
-        places=places,
-        corners=corners,
-        area=area,
-        color=np.array([look.color for look in seen])[slot],
-        coverage=coverage,
-        low=positions.min(axis=0),
-        high=positions.max(axis=0),
-        faces=len(mesh.polygons),
-        leaves=(0.5 + 0.5 * loose) * float(area @ coverage),
-    )
+    color, leaves = np.array([look.color for look in seen])[slot], (0.5 + 0.5 * loose) * float(area @ coverage)
+    low, high = positions.min(axis=0), positions.max(axis=0)
+    return _Mesh(places, corners, area, color, coverage, low, high, len(mesh.polygons), leaves)
 
 
 def _measure(variants: Iterable[tuple[Target, Floats]], depsgraph: bpy.types.Depsgraph) -> dict[str, Any]:

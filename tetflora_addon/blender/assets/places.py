@@ -501,10 +501,7 @@ def read_places(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> list[
 
 
 def _plant_places(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> list[Places]:
-    """Places of plants whose species is an asset, by the variants of each.
-
-    An object stands as it is turned and scaled in the scene, at the place of the plant instead of its own.
-    """
+    """Places of plants whose species is an asset, by its variants: objects as they are turned, where plants are."""
     read = read_asset_plants(scene, depsgraph)
     species = asset_species(scene)
     variants = {one: variants_of(species[one], depsgraph) for one in {plants.species for plants in read}}

@@ -97,14 +97,7 @@ class Parser(argparse.ArgumentParser):
 
 
 def main(arguments: Sequence[str]) -> int:
-    """Run one command on the open file; returns the exit code, see above.
-
-    Parameters
-    ----------
-    arguments : sequence of str
-        What follows ``--command tetflora``.
-
-    """
+    """Run one command, which follows ``--command tetflora``, on the open file; returns the exit code, see above."""
     return run(_parser(), arguments)
 
 
@@ -373,6 +366,4 @@ def register() -> None:
 
 def unregister() -> None:
     """Remove the command; 4.5 hangs at exit otherwise."""
-    global _command
     bpy.utils.unregister_cli_command(_command)
-    _command = None

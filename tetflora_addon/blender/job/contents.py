@@ -195,10 +195,7 @@ def in_wind(scene: bpy.types.Scene, flora: Flora, camera: Camera, moving: bool =
 
 
 def estimate(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> Statistics:
-    """Count plants, polygons of the expanded scene and instances of assets, without growing or reading any.
-
-    Errors are those of `read_scene` and `compile_for`.
-    """
+    """Count plants, expanded polygons and instances, growing none; errors are `read_scene`'s and `compile_for`'s."""
     given = read_scene(scene, depsgraph)
     if given.unknown:  # who counts in advance wants to know it
         raise SceneError(given.unknown)
@@ -235,10 +232,7 @@ def picture_bytes(scene: bpy.types.Scene, camera: Camera) -> int:
 
 
 def memory_left(scene: bpy.types.Scene, camera: Camera | None = None) -> float:
-    """Bytes that the scene's limit of memory leaves for results now; infinite without a limit.
-
-    What other processes of TetFlora will take is kept for them.
-    """
+    """Bytes that the scene's limit of memory leaves for results beside other processes; infinite without a limit."""
     most = most_memory(scene)
     picture = 0 if camera is None else picture_bytes(scene, camera)
     return memory.allowance(most, picture + pool.share(memory.limit(most)))

@@ -44,10 +44,7 @@ _learned = 1.0  # what refining took here last over what was expected
 
 
 def forecast(scene: Scene, view_layer: ViewLayer) -> Estimate | None:
-    """What refining takes by the present settings.
-
-    None without plants, where the camera cannot be used, and in a window for a moment, until crowns are known.
-    """
+    """What refining takes by the present settings; None without plants or usable camera, and until crowns are known."""
     return run_to_end(forecast_steps(scene, view_layer))
 
 
@@ -85,10 +82,7 @@ def seconds_here(expected: Estimate) -> float:
 
 
 def forecast_text(scene: Scene, view_layer: ViewLayer) -> str:
-    """``About 12 s, 4.1 M polygons, 2.5 GB``, and in a second line which limit holds; empty where nothing can be known.
-
-    As it was found last.
-    """
+    """``About 12 s, 4.1 M polygons, 2.5 GB``, as found last, and in a second line what limits it; empty if unknown."""
     return _outlook.of(scene, view_layer) or ""
 
 
@@ -195,10 +189,7 @@ def _aged(scene: Scene, scale: Floats, kinds: list[str], which: Integers, ages: 
 
 
 def _field(scene: Scene, obj: Object, points: Integers) -> tuple[int, Floats, Floats, list[str]]:
-    """The same of those points (n,) of a field that are plants now, as they are stored.
-
-    What nodes make of it is not known before they are evaluated.
-    """
+    """The same of those points (n,) of a field that are plants now, as stored: nodes are not evaluated yet."""
     kinds = [species_of(kind) for kind in field_kinds(obj)]
     number = len(points)
     chosen = points[_some(number)]

@@ -61,12 +61,7 @@ def scene_digest(
 ) -> str:
     """Digest of camera, plants, meshes, assets, occluders, lights, settings, species, materials, day and wind.
 
-    In the wind it changes with each frame.
-
-    Parameters
-    ----------
-    camera : Camera, optional
-        Instead of the scene's current one.
+    In the wind it changes with each frame. The camera is the scene's, and the contents are read, if none are given.
 
     Raises
     ------
@@ -157,10 +152,7 @@ def _around(scene: Scene, depsgraph: Depsgraph, given: SceneContents) -> Around:
 
 
 def camera_moves(scene: Scene) -> bool:
-    """Whether anything may move a scene's camera or change its lens from frame to frame.
-
-    It depends on the file alone, so that a frame is refined in the same way within an animation and alone.
-    """
+    """Whether anything in the file, whichever frames are rendered, may move a scene's camera or change its lens."""
     carrier = scene.camera
     if carrier is not None and is_animated(carrier.data):
         return True
@@ -174,10 +166,7 @@ def camera_moves(scene: Scene) -> bool:
 def key_of(
     scene: Scene, depsgraph: Depsgraph, layers: Sequence[ViewLayer], camera: Camera, contents: SceneContents
 ) -> str:
-    """Digest of all that results for view layers depend on, with their camera and contents.
-
-    Errors are those of `scene_digest`.
-    """
+    """Digest of all that results for view layers, a camera and contents depend on; errors as of `scene_digest`."""
     content = hashlib.sha256(scene_digest(scene, depsgraph, camera, contents).encode())
     add_to_digest(content, [scene.name, *(layer.name for layer in layers)])
     for group in (scene.tetflora, scene.tetflora.output, *scene.tetflora.output.species):

@@ -57,10 +57,7 @@ def plant_parts(flora: Flora, seeds: Seeds) -> list[Part]:
 
 
 def plant_mesh(scene: bpy.types.Scene, name: str, species: Species, parts: list[Part]) -> bpy.types.Mesh:
-    """One mesh of the parts of a plant (`plant_parts`), in its own space, with the materials of Refine.
-
-    Wood is shaded smooth, leaves flat. The scene's leaf objects and output settings count.
-    """
+    """One mesh of the parts of a plant (`plant_parts`) with the materials of Refine; wood is smooth, leaves flat."""
     numbered, materials = [], []
     for kind, form, buffers in parts:
         _, index = buffers.attributes.get("material_index", ("", np.zeros(buffers.polygons, dtype=np.int32)))
@@ -79,14 +76,9 @@ def plant_mesh(scene: bpy.types.Scene, name: str, species: Species, parts: list[
 
 @job("Convert Plants to Meshes")
 def make_plant_mesh_steps(data: JobData, plants: Iterable[bpy.types.Object]) -> Job[list[bpy.types.Object]]:
-    """Make ordinary mesh objects of plants, in their places and collections; the plants are disabled, not deleted.
+    """Make a mesh object of each plant, in their order, places and collections; they are disabled, not deleted.
 
     A step for each plant; closing the generator early removes what was made.
-
-    Returns
-    -------
-    list of bpy.types.Object
-        In the order of the plants, each with a mesh of its own.
 
     Raises
     ------

@@ -222,10 +222,7 @@ def _write_clusters(
 def _write_blocks(
     run: _Run, blocks: Iterator[int | Block | Buffers], start: float, write_proxy: ProxyWriter | None = None
 ) -> Job[None]:
-    """Write blocks of plants; progress goes from a given fraction to .95, and the statistics count.
-
-    The number of a tile comes before its blocks, and its proxies among them.
-    """
+    """Write blocks of plants, of a tile after its number; progress goes from a fraction to .95, statistics count."""
     materials: dict[tuple[int, str, int], list[bpy.types.Material]] = {}
     progress = Progress(start, "Making polygons")
 
@@ -463,14 +460,7 @@ def refine(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, **options: An
 
 
 def clear(scene: bpy.types.Scene, for_render: bool | None = None) -> int:
-    """Remove only what refinement made for a scene; how many datablocks that was.
-
-    Parameters
-    ----------
-    for_render : bool, optional
-        Only what was made for a render (True), only what the artist made (False), or both (None).
-
-    """
+    """Remove only what was made for a render (True), by the artist (False) or both (None); how many datablocks."""
     removed = remove_results(scene, {None: None, True: 'RENDER', False: 'VIEW'}[for_render])
     if not for_render:
         scene.tetflora.statistics = ""

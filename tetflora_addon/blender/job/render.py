@@ -292,13 +292,8 @@ def _complain(scene: bpy.types.Scene, message: str) -> None:
     complain(text)
 
 
+_END = dict.fromkeys(("render_complete", "render_cancel"), on_render_end)
+_SAVED = dict.fromkeys(("save_post", "save_post_fail"), on_save_post)
 register, unregister = handlers(
-    render_init=on_render_init,
-    render_pre=on_render_pre,
-    render_complete=on_render_end,
-    render_cancel=on_render_end,
-    save_pre=on_save_pre,
-    save_post=on_save_post,
-    save_post_fail=on_save_post,
-    load_post=on_load_post,
+    render_init=on_render_init, render_pre=on_render_pre, save_pre=on_save_pre, load_post=on_load_post, **_END, **_SAVED
 )

@@ -64,6 +64,12 @@ _OAK: Tones = (
 _ASH: Tones = (
     (0.1, (0.085, 0.075, 0.06)), (0.45, (0.33, 0.3, 0.25)), (0.75, (0.6, 0.57, 0.5)), (1.0, (0.86, 0.84, 0.77)),
 )  # fmt: skip
+_SPRUCE: Tones = (
+    (0.2, (0.17, 0.125, 0.105)), (0.55, (0.48, 0.39, 0.34)), (0.8, (0.68, 0.59, 0.53)), (1.0, (0.92, 0.86, 0.81)),
+)  # fmt: skip
+_BEECH: Tones = (
+    (0.2, (0.13, 0.125, 0.11)), (0.45, (0.38, 0.38, 0.355)), (0.62, (0.54, 0.55, 0.52)), (0.85, (0.86, 0.89, 0.85)),
+)  # fmt: skip
 _WILLOW: Tones = (
     (0.1, (0.13, 0.1, 0.08)), (0.45, (0.42, 0.35, 0.29)), (0.75, (0.66, 0.59, 0.52)), (1.0, (0.92, 0.86, 0.79)),
 )  # fmt: skip
@@ -223,10 +229,7 @@ def pattern_part(graph: Graph, character: str, place: Place) -> dict[str, Term]:
 
 
 def _grown(graph: Graph, given: dict[str, Term]) -> dict[str, Term]:
-    """Group "TetFlora Bark Growth" of all barks: moss where it is damp, lichen where a noise is low.
-
-    Both are as light as the bark beneath, so that the mean stays.
-    """
+    """Group "TetFlora Bark Growth": moss where damp, lichen where a noise is low, both as light as the bark beneath."""
     age, color = given["Age"], given["Color"]
     radii = given["Girth"] / tau
     noise = graph.noise(given["Round"] * (radii * _PATCHES), 4.0, 0.65)[0]
@@ -407,10 +410,7 @@ def papery(graph: Graph, place: Place) -> tuple[Term, Term]:
 
 
 def _plates(graph: Graph, place: Place) -> tuple[Term, Term, Term, Term]:
-    """Long plates of flakes that lie in layers, each its own red-brown or gray, with dark fissures between.
-
-    Color, height, part of a flake from its rim, and a fine noise.
-    """
+    """Long plates of flakes, dark fissures between: color, height, part of a flake from its rim, and a fine noise."""
     noise, wave = graph.noise(times(place.cells, 0.9, 1.5), 3.0, 0.62)
     where = bent(place.cells, wave, 1.0, 0.6)
     plate = cell(graph, where)
@@ -442,13 +442,7 @@ def scaly(graph: Graph, place: Place) -> tuple[Term, Term]:
     ring, hollow = lips(graph, eye)
     height = ring * 1.6 + (hollow * -2.0 + height)
     tone = (scale.random[1] * 0.3 + (lifted * 0.1 + noise)) * (solid * 0.45 + 0.55)
-    stops = (
-        (0.2, (0.17, 0.125, 0.105)),
-        (0.55, (0.48, 0.39, 0.34)),
-        (0.8, (0.68, 0.59, 0.53)),
-        (1.0, (0.92, 0.86, 0.81)),
-    )
-    return graph.mixed(hollow, tones(graph, tone, stops), _BLACK), height
+    return graph.mixed(hollow, tones(graph, tone, _SPRUCE), _BLACK), height
 
 
 def fibrous(graph: Graph, place: Place) -> tuple[Term, Term]:
@@ -481,13 +475,7 @@ def smooth(graph: Graph, place: Place) -> tuple[Term, Term]:
     tone = wrinkle * -0.08 + (marks * -0.3 + tone)
     height = wrinkle * -0.5 + (noise * 1.4 + lines * 0.4)
     height = hollow * -4.0 + (ring * 4.0 + (brow * -2.5 + height))
-    stops = (
-        (0.2, (0.13, 0.125, 0.11)),
-        (0.45, (0.38, 0.38, 0.355)),
-        (0.62, (0.54, 0.55, 0.52)),
-        (0.85, (0.86, 0.89, 0.85)),
-    )
-    return tones(graph, tone, stops), height
+    return tones(graph, tone, _BEECH), height
 
 
 def pitted(graph: Graph, place: Place) -> tuple[Term, Term]:

@@ -97,10 +97,7 @@ def _columns(
 
 
 def _pyramid_of(image: bpy.types.Image, weighted: bool, most: int) -> Pyramid | None:
-    """The pyramid of an image, of about so many columns or rows at most; None if it has no pixels.
-
-    Where its alpha counts, coarser copies have the color of what is not transparent.
-    """
+    """The pyramid of an image, weighted by alpha or not, of some columns or rows at most; None if it has no pixels."""
     if not (all(image.size) and image.channels):
         return None
     pixels = image_pixels(image)
@@ -393,10 +390,7 @@ FaceLooks = dict[str, NDArray[np.float16]]
 
 
 class FaceReader:
-    """Reads looks of faces; images and means of materials are kept from one mesh to the next.
-
-    Images are forgotten when they take too much memory; ``most`` is as of `_pyramid_of`.
-    """
+    """Reads looks of faces; keeps means, and images of ``most`` columns or rows (`_pyramid_of`) as memory allows."""
 
     def __init__(self, most: int = MOST_TEXELS) -> None:
         self.warnings: list[str] = []  # what the artist should know, each once

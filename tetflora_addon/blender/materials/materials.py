@@ -1,9 +1,6 @@
 # SPDX-FileCopyrightText: 2026 TetFlora Authors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Materials of leaves, bark, microsurfaces, microspheres and baked light.
-
-All share one scattering group, so that proxies match what they replace.
-"""
+"""Materials of leaves, bark, proxies and baked light; all share one scattering group, so that proxies match leaves."""
 
 from typing import Any
 

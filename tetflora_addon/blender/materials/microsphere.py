@@ -182,10 +182,7 @@ def _gloss_weight(
 
 
 def _highlight(graph: Graph, normal: Term, weight: Term, width: Term) -> Term:
-    """White reflection around a normal; light that bounces among facets counts, or up to a third would be lost.
-
-    Its weight is no color: gray facets would absorb at each bounce.
-    """
+    """White reflection with light that bounces among facets; its weight is no color, or gray facets would absorb."""
     inputs = {"Color": (1.0, 1.0, 1.0, 1.0), "Roughness": graph.math('SQRT', width), "Normal": normal}
     shader = graph.node("ShaderNodeBsdfAnisotropic", inputs, distribution='MULTI_GGX')
     # Mixed with nothing.

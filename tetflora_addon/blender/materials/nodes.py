@@ -43,10 +43,7 @@ def is_ours(datablock: bpy.types.ID) -> bool:
 
 
 def is_own(datablock: bpy.types.ID) -> bool:
-    """Whether TetFlora may change or remove a datablock: it is ours, and of this file.
-
-    What TetFlora made in another file is linked here by the artist, as itself or as a library override.
-    """
+    """Whether TetFlora may change or remove a datablock: it is ours, of this file, neither linked nor an override."""
     return is_ours(datablock) and datablock.library is None and datablock.override_library is None
 
 
@@ -121,15 +118,16 @@ class Term:
         return self * -1.0
 
 
+Terms = dict[str, Term]
+#: Name and kind of each output of a group; what makes the group of its inputs, and returns what its outputs show.
+Sockets = Sequence[tuple[str, str]]
+Build = Callable[["Graph", Terms], dict[str, Any]]
+
+
 class Graph:
-    """A node tree under construction.
+    """A node tree under construction, which is emptied first if it is to be fresh.
 
     Sockets are found by identifier or, of groups, by name: identifiers stayed where 5.x renamed "Fac" to "Factor".
-
-    Parameters
-    ----------
-    fresh : bool
-        Whether it is emptied first.
     """
 
     def __init__(self, tree: bpy.types.NodeTree, fresh: bool = True) -> None:
@@ -163,18 +161,8 @@ class Graph:
         ):
             socket.default_value = value
 
-    def part(
-        self,
-        name: str,
-        version: int,
-        given: dict[str, Term],
-        outputs: Sequence[tuple[str, str]],
-        build: Callable[[Self, dict[str, Term]], dict[str, Any]],
-    ) -> dict[str, Term]:
-        """Outputs of a `node_group` that is fed with terms.
-
-        Blender looks through a whole tree after each change: two trees of half the nodes are built in half the time.
-        """
+    def part(self, name: str, version: int, given: Terms, outputs: Sockets, build: Build) -> Terms:
+        """Outputs of a `node_group` fed with terms; Blender builds two trees of half the nodes in half the time."""
         inputs = [(key, 'Vector' if term.is_vector else 'Float') for key, term in given.items()]
         return self.outputs("ShaderNodeGroup", given, node_tree=node_group(name, version, inputs, outputs, build))
 
@@ -196,10 +184,7 @@ class Graph:
         return Term(self, node.outputs[0])
 
     def vector(self, operation: str, *values: Any) -> Term:
-        """Vector operation; the result is a number for ``'DOT_PRODUCT'``, ``'DISTANCE'`` and ``'LENGTH'``.
-
-        The second operand of ``'SCALE'`` is the factor.
-        """
+        """Vector operation; ``'DOT_PRODUCT'``, ``'DISTANCE'``, ``'LENGTH'`` give a number, ``'SCALE'`` takes one."""
         node = self.node("ShaderNodeVectorMath", operation=operation)
         names = ("Vector", "Scale") if operation == 'SCALE' else ("Vector", "Vector_001")
         for key, value in zip(names, values, strict=False):
@@ -294,12 +279,7 @@ def find_socket(sockets: Any, key: str) -> bpy.types.NodeSocket:
 
 
 def node_group(
-    name: str,
-    version: int,
-    inputs: Sequence[tuple],
-    outputs: Sequence[tuple[str, str]],
-    build: Callable[[Graph, dict[str, Term]], dict[str, Any]],
-    kind: str = "Shader",
+    name: str, version: int, inputs: Sequence[tuple], outputs: Sockets, build: Build, kind: str = "Shader"
 ) -> bpy.types.NodeTree:
     """A group of shader nodes, or of ``'Geometry'`` nodes, as `_get_or_create` finds or makes it.
 
@@ -307,10 +287,8 @@ def node_group(
     ----------
     inputs : sequence of tuple
         Name, kind (``'Float'``, ``'Color'``, ``'Vector'``, ...), default, and if needed a range and a description.
-    outputs : sequence of tuple
-        Name and kind.
-    build : callable
-        Gets the graph and the inputs by name; returns what to link to the outputs, by name.
+    outputs, build
+        See `Sockets` and `Build`.
     """
 
     def fill(tree: bpy.types.NodeTree) -> None:

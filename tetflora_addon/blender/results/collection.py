@@ -111,10 +111,7 @@ class Results:
         species: Species | None = None,
         look: str = "",
     ) -> Generator[None, None, bpy.types.Object]:
-        """Write a mesh, or points of one material, as an object of the collection, step by step.
-
-        It is of one species, or of None, and of a look.
-        """
+        """Write a mesh, or points of one material, as an object of a species or None, and of a look, step by step."""
         self.use(materials)
         name = self.name_for(name)
         if isinstance(buffers, PointBuffers):
@@ -206,10 +203,7 @@ class Results:
         self.tiles.setdefault(self.tile, []).append(obj)
 
     def finish(self) -> None:
-        """Everything is made and earlier results are gone, whose names these take.
-
-        The output settings decide about the artist's results; files never hold a render's.
-        """
+        """Everything is made and earlier results are gone, whose names these take; output settings now count."""
         for obj, species in self._waiting:
             self._place(obj, species)
         self._waiting.clear()

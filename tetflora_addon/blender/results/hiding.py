@@ -218,10 +218,7 @@ def adopt_copies() -> None:
 
 
 def hidden_originals(scene: Scene, purpose: str | None = None) -> list[Object]:
-    """Objects that are hidden for a scene's results, or for results that no longer exist.
-
-    They may not be in the scene any more.
-    """
+    """Objects hidden for a scene's results, or for results that are gone; they may be in the scene no more."""
     purposes = HIDDEN if purpose is None else [purpose]
     marked = [o for which in purposes for o in _marked(which) if _concerns(scene, o, which)]
     return marked + [o for which in purposes for o in linked_hidden(scene, which)]
@@ -281,12 +278,8 @@ def _replacing(original: Object, purpose: str) -> list[Scene]:
     """Scenes whose results replace an object; where one was renamed, those that the object is in."""
     names = _marker(original, purpose)[1]
     renamed = any(name not in bpy.data.scenes for name in names)
-    return [
-        scene
-        for scene in bpy.data.scenes
-        if output.result_collections(scene, purpose)
-        and (scene.name in names or (renamed and scene.objects.get(original.name) == original))
-    ]
+    scenes = [scene for scene in bpy.data.scenes if output.result_collections(scene, purpose)]
+    return [s for s in scenes if s.name in names or (renamed and s.objects.get(original.name) == original)]
 
 
 def keep_results(scene: Scene) -> int:

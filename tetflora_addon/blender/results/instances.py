@@ -105,14 +105,10 @@ def add_cluster_instances(
 
 
 def add_cluster(results: Results, stem: str, number: int, mesh: Mesh, like: Object | None = None) -> Object:
-    """Make an object of a mesh of a cluster, in no collection, for `add_cluster_instances`.
+    """Make an object of the mesh of a numbered cluster, which goes with it, in no collection.
 
     Parameters
     ----------
-    number : int
-        Of the cluster; the name ends in it.
-    mesh : bpy.types.Mesh
-        Becomes the result's, and goes with it.
     like : bpy.types.Object, optional
         The object that the faces are of, whose color, pass index and the like materials may read.
     """
@@ -243,13 +239,7 @@ _TURNED_OFF = ("is_scatter", "is_explicit", "is_plant", "is_field", "is_occluder
 
 
 def add_stand_in(results: Results, name: str, original: Object, depsgraph: Depsgraph) -> Object | None:
-    """Add what an object shows besides instances to the results; None if that is nothing.
-
-    Parameters
-    ----------
-    original : bpy.types.Object
-        Of this file or of a library; shown or hidden.
-    """
+    """Add what an object, hidden or not, shows besides instances to the results; None if that is nothing."""
     if not shows_itself(original, depsgraph):
         return None
     name = results.name_for(name)

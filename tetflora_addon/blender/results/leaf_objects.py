@@ -8,7 +8,6 @@ from math import tau
 
 import bpy
 import numpy as np
-from numpy.typing import NDArray
 
 from ...arrays import connected
 from ...errors import SpeciesError
@@ -60,7 +59,7 @@ def _blade_kind(model: LeafModel, transmission: float, kind: str = "leaf") -> st
     outline = _outline(model)
     if outline is not None:
         return "palmate" if outline.palmate else _simple(outline.width, outline.lobes > 0)
-    width, length = _extent(model)
+    width, length = np.ptp(model.uv, axis=0)
     if _leaflets(model, length):
         return "plain"
     ratio = width / max(length, 1e-6)
@@ -84,18 +83,13 @@ def _venation(model: LeafModel, blade: str) -> dict[str, float]:
     """Veins to a leaf's length: they end in lobes or few teeth, and the blade swells between them; others are flat."""
     outline = _outline(model)
     if blade == "parallel":
-        return {"veins": _ACROSS / max(_extent(model)[0] if outline is None else outline.width, 1e-3)}
+        return {"veins": _ACROSS / max(np.ptp(model.uv[:, 0]) if outline is None else outline.width, 1e-3)}
     if outline is None or blade not in ("lobed", "pinnate"):
         return {}
     ends = outline.lobes if blade == "lobed" else outline.teeth
     if 3 <= ends <= _FEW:
         return {"veins": 1.15 * (ends + 0.5)}
     return {"veins": 1.15 * (min(_APART / outline.width, _FEW) + 0.5), "relief": _FLAT}
-
-
-def _extent(model: LeafModel) -> NDArray[np.floating]:
-    """Width and length (2,) in the UV map."""
-    return np.ptp(model.uv, axis=0)
 
 
 def _leaflets(model: LeafModel, length: float) -> bool:

@@ -138,12 +138,7 @@ def _check_range(key: str, indices: NDArray, count: int) -> None:
 
 
 def point_object(name: str, buffers: PointBuffers, material: bpy.types.Material) -> bpy.types.Object:
-    """Make an object of points that render as spheres, not linked to any collection.
-
-    Returns
-    -------
-    bpy.types.Object
-        Its data is a point cloud, or a mesh with a modifier.
+    """Make an object of points that render as spheres, a point cloud or a mesh with a modifier, in no collection.
 
     Raises
     ------
@@ -411,15 +406,8 @@ def _buffers(pieces: Sequence[_Piece], smooth: bool) -> MeshBuffers:
     corner_verts = _joined([p.corner_verts + n for p, n in zip(pieces, first[:-1], strict=True)])
     offsets = np.zeros(sum(len(p.face) for p in pieces) + 1, np.int32)
     np.cumsum(_joined([p.sizes for p in pieces]), out=offsets[1:])
-    none = np.zeros((0, 2), np.int32)
-    return MeshBuffers(
-        positions=_joined([p.positions for p in pieces]),
-        edge_verts=none,
-        corner_verts=corner_verts,
-        corner_edges=corner_verts,
-        face_offsets=offsets,
-        smooth=smooth,
-    )
+    positions, no_edges = _joined([p.positions for p in pieces]), np.zeros((0, 2), np.int32)
+    return MeshBuffers(positions, no_edges, corner_verts, corner_verts, offsets, smooth=smooth)
 
 
 def _joined(arrays: Sequence[NDArray]) -> NDArray:

@@ -105,10 +105,7 @@ def dress_collection(scene: bpy.types.Scene, collection: bpy.types.Collection) -
 
 
 def mark_runtime(collection: bpy.types.Collection, runtime: bool) -> None:
-    """Set whether Blender leaves a result collection and its contents out of files.
-
-    Objects in other collections too, and meshes with other users, stay in.
-    """
+    """Keep a result collection out of files, or not; objects in other collections too, and shared meshes, stay in."""
     collection.is_runtime_data = runtime
     for obj in collection.objects:
         if is_own(obj) and (len(obj.users_collection) == 1 or not runtime):
@@ -191,16 +188,8 @@ def result_collections(scene: bpy.types.Scene, purpose: str | None = None) -> li
         other = bpy.data.collections.get((one[MADE], None))
         return other not in {None, one} and (other in inside or not {*one.objects}.isdisjoint(other.objects))
 
-    return [
-        c
-        for c in inside
-        if PURPOSE in c
-        and MADE in c
-        and (purpose is None or c[PURPOSE] == purpose)
-        and c.library is None
-        and c.override_library is None
-        and not copied(c)
-    ]
+    marked = [c for c in inside if PURPOSE in c and MADE in c and c.library is None and c.override_library is None]
+    return [c for c in marked if purpose in {None, c[PURPOSE]} and not copied(c)]
 
 
 def megabytes_held(purpose: str, scene: bpy.types.Scene | None = None) -> float:
@@ -218,10 +207,7 @@ def release_copies(collection: bpy.types.Collection) -> None:
 
 
 def remove_collection(scene: bpy.types.Scene | None, collection: bpy.types.Collection) -> int:
-    """Remove a result collection, linked to a scene or not; returns the number of datablocks removed.
-
-    The artist's own objects in it stay in the scene, if that is there.
-    """
+    """Remove a result collection, but leave the artist's objects in the scene, if given; how many datablocks went."""
     objects = list(collection.objects)
     ours = [o for o in objects if is_own(o) and not (o.get(KIND) == PARENT and len(o.users_collection) > 1)]
     if scene is not None:

@@ -7,6 +7,7 @@ from itertools import count
 
 import bpy
 import numpy as np
+from numpy.typing import NDArray
 
 from ...arrays import Floats32, Integers32
 from ...buffers import MeshBuffers, PointBuffers
@@ -24,13 +25,7 @@ from .proxy_kinds import ProxyKind, proxy_kind_of
 
 
 class Baking:
-    """Baked light of one refinement: `add` all polygons, then `add_facets`, then `look`.
-
-    Parameters
-    ----------
-    leaves : bool
-        Whether real leaves, blossoms and bark get baked light as well.
-    """
+    """Baked light of one refinement, of leaves and bark too where asked: `add` all polygons, `add_facets`, `look`."""
 
     def __init__(self, sources: Sources, leaves: bool) -> None:
         self.sources, self.leaves = sources, leaves
@@ -47,10 +42,7 @@ class Baking:
         self.first_facet = len(self.sheets)
 
     def add_facets(self, refined: EmissionInput) -> Iterator[int]:
-        """Add the facets of all proxies; yields how many there are so far.
-
-        They stay, to be written with their light.
-        """
+        """Add the facets of all proxies, to be written with their light later; yields how many there are so far."""
         count = 0
         for parts in refined.facet_parts(again=True):
             for facets, _ in parts:
@@ -68,7 +60,7 @@ class Baking:
         for number, (obj, first) in enumerate(self._meshes):
             mesh = obj.data
             stored = [read(mesh, name) for name in ("position", ".corner_vert", "tf_color", "tf_transmission")]
-            given = self.light, first, obj[KIND] == "bark", face_offsets(mesh), *stored
+            given = self.light, first, obj[KIND] == "bark", face_offsets(mesh), stored
             attributes = yield from in_thread(calling(_light_of_mesh, *given))
             for name, (domain, values) in attributes.items():
                 write(mesh, name, values, domain)
@@ -76,17 +68,10 @@ class Baking:
 
 
 def _light_of_mesh(
-    light: BakedLight,
-    first: int,
-    rounded: bool,
-    offsets: Integers32,
-    positions: Floats32,
-    corner_verts: Integers32,
-    color: Floats32,
-    transmission: Floats32,
+    light: BakedLight, first: int, rounded: bool, offsets: Integers32, stored: list[NDArray]
 ) -> Mapping[str, tuple[str, Floats32]]:
     """Attributes of a mesh whose faces are the sheets from ``first`` on: its light, at vertices where it is round."""
-    faces = len(offsets) - 1
+    (positions, corner_verts, color, transmission), faces = stored, len(offsets) - 1
     front, back = np.zeros((2, faces, 3), np.float32)
     for start in range(0, faces, BATCH):
         part = slice(start, min(start + BATCH, faces))
@@ -104,10 +89,7 @@ ProxyWriter = Callable[[Buffers], Generator[None, None, Progress]]
 def proxy_writer(
     results: Results, form: ProxyKind, refined: EmissionInput, statistics: Statistics, baked: bool = False
 ) -> ProxyWriter:
-    """What makes objects of the buffers of proxies; the statistics get the number of faces or points, and their memory.
-
-    They are numbered by their tiles, or where there are none one after the other.
-    """
+    """What makes objects of proxies, numbered by tile or in order; the statistics get faces or points, and memory."""
     numbers = count()
 
     def write(buffers: Buffers) -> Generator[None, None, Progress]:

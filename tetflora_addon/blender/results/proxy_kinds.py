@@ -27,6 +27,8 @@ _SETTINGS = ("transparent_max_bounces", "min_transparent_bounces")
 _OCCLUSION = ("use_raytracing", "use_fast_gi")
 
 _Material = Callable[[], bpy.types.Material]
+_SHELL = {"p": "shell_diffuse", "s": "shell_gloss"}
+_SHELL |= {name: f"shell_{name.lower()}" for name in ("spear", "Roundness", "Variation")}
 _ASSET_FACETS, _ASSET_SPHERES = partial(proxy_material, asset=True), partial(sphere_material, asset=True)
 
 
@@ -73,13 +75,7 @@ _FORMS = {
             SHELLS,
             material=shell_material,
             baked_material=baked_shell_material,
-            sockets={
-                "p": "shell_diffuse",
-                "s": "shell_gloss",
-                "spear": "shell_spear",
-                "Roundness": "shell_roundness",
-                "Variation": "shell_variation",
-            },
+            sockets=_SHELL,
             bounces=256,
         ),
         ProxyKind(

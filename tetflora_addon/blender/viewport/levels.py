@@ -60,10 +60,7 @@ _QUICK = 0.3  # seconds that reading may take for plants to follow the timeline 
 
 @job("Compute Levels")
 def level_steps(data: JobData) -> Generator[Progress, None, Levels]:
-    """Refine a scene without making anything, and keep all levels for viewports; closing it changes nothing.
-
-    Errors are those of `job.refine_steps`.
-    """
+    """Refine a scene and make only levels for viewports; closing it changes nothing. Errors are `refine_steps`'."""
     scene, depsgraph = data.scene, data.depsgraph
     data.add_objects([*taking_part(scene), *([] if scene.camera is None else [scene.camera])])
     yield Progress(0.0, "Reading the scene")
@@ -83,11 +80,9 @@ def level_steps(data: JobData) -> Generator[Progress, None, Levels]:
     states = refine_loop(flora, given.seeds, camera, settings, *others)
     # Nobody knows how many passes will follow.
     fractions = (1.0 - 0.95 * 0.85**number for number in count(1))
-    shown = mapped(
-        gather(states, flora, camera),
-        lambda one: Progress(next(fractions), f"Level {one.number}: {len(one):,} tetrahedra"),
-    )
-    levels = yield from steps_in_thread(shown, Progress(0.05, "Level 0"))
+    steps = gather(states, flora, camera)
+    told = mapped(steps, lambda one: Progress(next(fractions), f"Level {one.number}: {len(one):,} tetrahedra"))
+    levels = yield from steps_in_thread(told, Progress(0.05, "Level 0"))
     data.check()
     preview = of(scene)
     preview.levels, preview.looked = levels, looked

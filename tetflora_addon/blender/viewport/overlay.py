@@ -249,14 +249,10 @@ def _draw_levels(preview: Preview, settings: TetFloraPreview, space: bpy.types.S
     gpu.state.depth_test_set('LESS_EQUAL')
     gpu.state.depth_mask_set(False)  # clouds hide nothing
     if settings.projected:
-        view = tuple(np.array(space.region_3d.view_matrix).ravel().round(7)), space.region_3d.is_perspective
-        overlay = _kept(
-            preview,
-            f"projected {space.as_pointer()}",
-            (*shown, *view),
-            lambda: _made_in_time(preview, level, forms, view_camera(space.region_3d, space.clip_start, origin)),
-        )
-        _draw(overlay, origin)
+        region, name = space.region_3d, f"projected {space.as_pointer()}"
+        view = tuple(np.array(region.view_matrix).ravel().round(7)), region.is_perspective
+        camera = view_camera(region, space.clip_start, origin)
+        _draw(_kept(preview, name, (*shown, *view), lambda: _made_in_time(preview, level, forms, camera)), origin)
     if settings.wires:
         overlay = _kept(preview, "wires", (*shown, settings.color), lambda: wires(levels, level, settings.color, forms))
         _draw(overlay, origin)
@@ -300,15 +296,9 @@ def lines_of(scene: bpy.types.Scene, preview: Preview) -> list[tuple[str, tuple[
         level = preview.levels.at(settings.level)
         figures, last = level.figures, preview.levels.levels[-1].number
         lines.append((f"Level {level.number} of {last}   {len(level):,} tetrahedra with plants", _TEXT))
-        parts = (
-            (Decision.EXPLICIT, "explicit", figures.explicit),
-            (Decision.PROXY, "proxies", figures.proxy),
-            (Decision.HIDDEN, "hidden", figures.hidden),
-            (Decision.SPLIT, "to split", figures.split),
-        )
-        for decision, name, number in parts:
-            color = (*FORMS[decision], 1.0) if settings.color == 'FORM' else _TEXT
-            lines.append((f"    {number:,} {name}", color))
+        for name, text in {"explicit": "explicit", "proxy": "proxies", "hidden": "hidden", "split": "to split"}.items():
+            color = (*FORMS[Decision[name.upper()]], 1.0) if settings.color == 'FORM' else _TEXT
+            lines.append((f"    {getattr(figures, name):,} {text}", color))
         lines.append((f"    {figures.polygons:,} explicit polygons", _TEXT))
         if settings.color != 'FORM' and settings.wires:
             lines.append(("    dark: low    bright: high", _TEXT))

@@ -153,16 +153,11 @@ def _clear() -> None:
     redraw()
 
 
-switch = SceneSwitch(
-    "tetflora_points",
-    "Preview Points",
+_TOOLTIP = (
     "Show a dot in the viewport for each plant that the active layer would place by its present settings, "
-    "colored by species, updated with every change. Creates no objects",
-    _place,
-    _clear,
-    _SOON,
-    drawn=True,
+    "colored by species, updated with every change. Creates no objects"
 )
+switch = SceneSwitch("tetflora_points", "Preview Points", _TOOLTIP, _place, _clear, _SOON, drawn=True)
 schedule = switch.schedule
 _HANDLERS = handlers(
     undo_post=lambda *_: schedule(), redo_post=lambda *_: schedule(), load_pre=lambda *_: switch.forget()

@@ -122,16 +122,11 @@ def _on_undo(*_: object) -> None:
         switch.look()
 
 
-switch = SceneSwitch(
-    "tetflora_species",
-    "Preview",
+_TOOLTIP = (
     "Show one plant of the species in the editor at the 3D cursor, updated with every change. It is never "
-    "rendered or saved",
-    _build,
-    _remove,
-    _SOON,
-    drawn=False,
+    "rendered or saved"
 )
+switch = SceneSwitch("tetflora_species", "Preview", _TOOLTIP, _build, _remove, _SOON, drawn=False)
 _HANDLERS = handlers(
     undo_pre=_before, redo_pre=_before, undo_post=_on_undo, redo_post=_on_undo, load_pre=lambda *_: switch.forget()
 )
