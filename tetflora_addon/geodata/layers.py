@@ -80,9 +80,8 @@ def read_features(path: Path, chosen: int = 0) -> tuple[list[_Feature], System]:
         geometry = feature.get("geometry", ...) if isinstance(feature, dict) else ...
         properties = feature.get("properties") if isinstance(feature, dict) else None
         if not isinstance(geometry, dict | None) or not isinstance(properties, dict | None):
-            raise SceneError(
-                f"{name}: feature {number:,}: it has no geometry, or properties that are no object; correct it"
-            )
+            problem = "it has no geometry, or properties that are no object"
+            raise SceneError(f"{name}: feature {number:,}: {problem}; correct it")
         if geometry is not None and not isinstance(geometry.get("type"), str):
             raise SceneError(f"{name}: feature {number:,}: its geometry has no type; correct it")
     return features, chosen_system(chosen or _code(data.get("crs"), name), System(), f"{name}: ")

@@ -438,10 +438,7 @@ def to_degrees(system: System, points: Floats) -> Floats:
 
 
 def from_degrees(system: System, points: Floats) -> Floats:
-    """Points (n, 2) of a system that lies on Earth, from longitude and latitude in degrees on WGS 84, (n, 2).
-
-    What is too far from the system's meridian is nan.
-    """
+    """Points (n, 2) of a system on Earth from longitude and latitude (n, 2), degrees on WGS 84; too far off nan."""
     points, definition = np.asarray(points, np.float64), system.definition
     if definition.method == "geo" and not any(definition.shift):
         return points
