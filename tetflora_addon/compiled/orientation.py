@@ -71,10 +71,7 @@ def wood_moments(orientation: Orientation, subplants: Branches) -> Floats:
 
 
 def _evaluated(coefficients: Floats, row: Integers, frame: Floats, outward: Floats) -> Floats:
-    """Moments (n, 3, 3) in the world for branches with frames (n, 3, 3), so far outside in the crown (n,).
-
-    By polynomials (r, 1, 33, 6) of rows (n,), or (r, 3, 33, 6) at `NODES`.
-    """
+    """Moments (n, 3, 3) of branches with frames (n, 3, 3), from polynomials (r, 1 or 3 `NODES`, 33, 6) of rows (n,)."""
     basis = _basis(frame[:, 2, :])
     local = np.zeros((len(row), 6))
     for r in np.unique(row):
@@ -250,10 +247,7 @@ def _sample_branches(row: int, length: float, sky: Floats) -> Branches:
 
 
 def _some_children(rows: Table, branches: Branches, lines: Axes) -> tuple[Branches, Integers, Floats]:
-    """One child of each sort of each branch that has any: the children, their parents, and how many each stands for.
-
-    Of plants that are drawn by hand all branches that are drawn.
-    """
+    """One child of each sort of branches, or all that are drawn by hand; parents, and how many each stands for."""
     if rows["phantom"][branches.row[0]]:
         children, owner = drawn_children(rows, branches)
         return children, owner, np.ones(len(owner))

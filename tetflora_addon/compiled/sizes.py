@@ -163,11 +163,8 @@ def _even_parts(crown: Crown) -> CrownParts:
 
 
 def _some(points: Points, row: int, lengths: Floats) -> tuple[Floats, Integers, Floats, Floats]:
-    """Places (n, 3) of samples of upright trunks of lengths (k,), their rows (n,), of how many of its row (n,) each is
-    one, and where leaves point (n, 3).
-
-    Few of large branches, which have most of the samples, so that there are as many of small ones.
-    """
+    """Places (n, 3) of samples of upright trunks of lengths (k,), rows (n,), samples of each row (n,), leaves' ways."""
+    # Few of large branches, which have most of the samples, so that there are as many of small ones.
     first, number = int(points.first[row, -1]), int(points.number[row, -1])
     rows = points.row[first : first + number]
     most = _PARTS // len(np.unique(rows))
@@ -453,10 +450,8 @@ def _likely(rows: Table, stems: list[tuple[Branches, Axes]], n: int) -> list[tup
 
 
 def _mean_tips(rows: Table, stems: Branches, lines: Axes) -> tuple[Integers, Integers, Integers, Floats32]:
-    """Limbs of stems (n,), stems and numbers (m,) of all limbs, and about where they end (m, 5) in `DIRECTIONS`.
-
-    As `growth.chosen_children` has it, but for what differs at random from limb to limb.
-    """
+    """Limbs of stems (n,), stems and numbers (m,) of all limbs, and about where they end (m, 5) in `DIRECTIONS`."""
+    # As `growth.chosen_children` has it, but for what differs at random from limb to limb.
     counts = branch_counts(rows, stems)
     owner, index = spread(counts)
     row, child = stems.row, np.maximum(rows["next"][stems.row, LATERAL], 0)
