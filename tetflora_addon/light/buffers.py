@@ -103,10 +103,7 @@ class LightBuffer:
         self._own_key = own_key[self._by_cell]
 
     def _sheet_fragments(self, sheets: Floats) -> Iterator[tuple[NDArray, ...]]:
-        """Owner, pixel, entry, thickness 0 and optical depth of sheets, some at a time.
-
-        A sheet that covers the fraction c of a pixel lets 1 − c through: its optical depth is −ln (1 − c).
-        """
+        """Owner, pixel, entry, thickness 0 and optical depth −ln (1 − c) of sheets that cover c of a pixel, in runs."""
         across = self.camera.pixel_size * self.camera.width / self.width
         # The view may show part of the scene; where a sheet is not ahead, it would have parts without end.
         center = sheets.mean(axis=1, dtype=np.float64)
