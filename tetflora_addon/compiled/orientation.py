@@ -164,8 +164,7 @@ def orientation_of(rows: Table, forms: Sequence[Forms], leaf: Floats, wood: Floa
                 leaves = branch_leaves.mixed(leaves, leaf[i, i] / leaf_area[i])
                 knots = np.stack([branches.position, branches.position + branches.frame[:, :, 2]], axis=1)
                 straight = Axes(knots, branches.frame[:, None], np.ones(len(branches), np.int64))
-                straight_leaves = _own_leaves(rows, branches, straight, turn[i], place)
-                out.own_leaves[i, node] = straight_leaves.fitted(branches, basis)
+                out.own_leaves[i, node] = _own_leaves(rows, branches, straight, turn[i], place).fitted(branches, basis)
             out.leaves[i, node] = leaves.fitted(branches, basis)
         weight = stands * children.length * children.radius * wood_area[row]
         bark = _Sums.of(len(branches), owner, _evaluated(out.wood, row, children.frame, children.outward), weight)
@@ -276,8 +275,7 @@ def _own_leaves(rows: Table, branches: Branches, lines: Axes, turn: Floats, plac
     owner, each = np.repeat(bearers, leaves), np.tile(np.arange(leaves), len(bearers))
     number = counts[owner]
     # Evenly over the leaves of each branch, beginning anywhere.
-    part = (uniform(branches.key, _CHILD)[owner] + each / leaves) % 1.0
-    index = (part * number).astype(np.int64)
+    index = ((uniform(branches.key, _CHILD)[owner] + each / leaves) % 1.0 * number).astype(np.int64)
     if rows["leaf_spray"][row[0]] > 0:  # one leaf after the other, so that both sides of the spray have as many
         index = (index - index % _LEAVES + each) % number
     key = foliage.leaf_keys(branches, owner, index)

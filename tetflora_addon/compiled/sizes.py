@@ -198,8 +198,7 @@ def _branch_parts(flora: Flora, points: Points, row: int, lengths: Floats) -> Cr
     trunk_radius = float(flora.averages.radius[row]) * length / float(flora.averages.length[row])
     totals, bud = flora.averages, flora.species[0].bud
     sides, segments = flora.rows["sides"][rows].astype(np.int64), flora.rows["segments"][rows].astype(np.int64)
-    faces = (totals.fixed_faces + totals.full_faces)[row][rows]
-    number = faces / (sides * (segments + flora.rows["rings"][rows]))
+    number = (totals.fixed_faces + totals.full_faces)[row][rows] / (sides * (segments + flora.rows["rings"][rows]))
     leaves = totals.leaves[row][rows] / np.maximum(number, 1e-300)
     buds = np.zeros(len(rows)) if bud is None else np.where(leaves > 0.0, 1.0 + bud.lateral * leaves, 0.0)
     surface = (totals.fixed_wood + totals.full_wood)[row][rows] * length * trunk_radius + totals.spur_wood[row][rows]

@@ -412,8 +412,7 @@ def _strings(codes: Integers) -> tuple[bytes, bool]:
     length = steps + 1
     start = np.cumsum(length) - length
     code, offset = spread(length)
-    source = start[maker[code]] + offset
-    return codes[code[top(source)]].astype(np.uint8).tobytes(), bool(len(bad))
+    return codes[code[top(start[maker[code]] + offset)]].astype(np.uint8).tobytes(), bool(len(bad))
 
 
 def _packed(data: bytes, most: int) -> bytes:

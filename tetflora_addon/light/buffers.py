@@ -82,8 +82,7 @@ class LightBuffer:
             hit = np.flatnonzero(np.isfinite(end))
             across = camera.pixel_size * camera.width / self.width
             shifted = end[hit] + BIAS * across * (1.0 if camera.kind == "ORTHO" else end[hit])
-            nothing = np.zeros(len(hit))
-            parts.append((np.full(len(hit), -1, np.int32), hit, shifted, nothing, np.full(len(hit), OPAQUE)))
+            parts.append((np.full(len(hit), -1, np.int32), hit, shifted, np.zeros(len(hit)), np.full(len(hit), OPAQUE)))
         if sheets is not None and len(sheets):
             parts += [(owner + np.int32(len(vertices)), *rest) for owner, *rest in self._sheet_fragments(sheets)]
         cell, pixel, entry, thickness, depth = (np.concatenate(arrays) for arrays in zip(*parts, strict=True))

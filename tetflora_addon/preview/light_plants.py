@@ -190,8 +190,7 @@ def with_faces(shapes: Shapes, points: Integers | slice = slice(None)) -> Shapes
     shown = np.column_stack([forms[:, :2], looks[:, 3:4] * forms[:, 2:]])
     foot, leaves, wood = _THIN * forms[:, 1], looks[:, :3], looks[:, 4:]
     positions, colors = _crowns(crowns.positions[points], frame, shown, foot, leaves, wood)
-    indices = _repeated(_faces(), len(_NORMALS), len(up))
-    return Shapes(positions, colors, indices, len(up), shapes.of, shapes.origin)
+    return Shapes(positions, colors, _repeated(_faces(), len(_NORMALS), len(up)), len(up), shapes.of, shapes.origin)
 
 
 def bounds_of_plants(flora: Flora, seeds: Seeds, most: int = MOST_PLANTS) -> Shapes:
