@@ -361,12 +361,10 @@ class System:
     @property
     def name(self) -> str:
         """For messages."""
-        if self.epsg > 0:
-            return f"EPSG:{self.epsg}"
-        return {
-            0: "plain meters" if self.unit == 1.0 else f"plain units of {self.unit:g} m",
-            -2: "the system that the file defines",
-        }.get(self.epsg, f"the plane about {self.latitude:.5f}, {self.longitude:.5f}")
+        plain = "plain meters" if self.unit == 1.0 else f"plain units of {self.unit:g} m"
+        about = f"the plane about {self.latitude:.5f}, {self.longitude:.5f}"
+        names = {0: plain, -1: about, -2: "the system that the file defines"}
+        return names.get(self.epsg, f"EPSG:{self.epsg}")
 
 
 @cache
@@ -519,9 +517,8 @@ def place_about(system: System, low: Floats, high: Floats, what: str = "") -> Ma
     else:
         longitude, latitude = np.round(to_degrees(system, middle[None])[0], 6).tolist()
         if not (abs(longitude) <= 360.0 and abs(latitude) < 89.0):
-            raise SceneError(
-                readable(f"{what}{longitude:g}, {latitude:g} is no longitude and latitude with room about it")
-            )
+            told = f"{what}{longitude:g}, {latitude:g}"
+            raise SceneError(readable(f"{told} is no longitude and latitude with room about it"))
         place = MapOrigin(System(-1, longitude, latitude), 0.0, 0.0)
     ends = np.array([[low[0], middle[1]], [high[0], middle[1]], [middle[0], low[1]], [middle[0], high[1]]])
     sides = between(ends, system, place.system)
