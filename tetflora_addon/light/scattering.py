@@ -52,20 +52,10 @@ SOLID_ANGLE = 4.0 * np.pi / len(DIRECTIONS)
 def harmonics(directions: Floats) -> Floats:
     """Real spherical harmonics up to the second band (..., 9) of unit vectors (..., 3)."""
     x, y, z = np.moveaxis(np.asarray(directions, np.float64), -1, 0)
-    return np.stack(
-        [
-            np.full_like(x, 0.28209479177387814),
-            0.4886025119029199 * y,
-            0.4886025119029199 * z,
-            0.4886025119029199 * x,
-            1.0925484305920792 * x * y,
-            1.0925484305920792 * y * z,
-            0.31539156525252005 * (3.0 * z * z - 1.0),
-            1.0925484305920792 * x * z,
-            0.5462742152960396 * (x * x - y * y),
-        ],
-        axis=-1,
-    )
+    linear = (0.4886025119029199 * axis for axis in (y, z, x))
+    xy, yz, xz = (1.0925484305920792 * a * b for a, b in ((x, y), (y, z), (x, z)))
+    zz, xx_yy = 0.31539156525252005 * (3.0 * z * z - 1.0), 0.5462742152960396 * (x * x - y * y)
+    return np.stack([np.full_like(x, 0.28209479177387814), *linear, xy, yz, zz, xz, xx_yy], axis=-1)
 
 
 def irradiance(light: Floats, normals: Floats) -> Floats:
