@@ -434,8 +434,7 @@ def _inflated(data: bytes, most: int) -> bytes:
 _READERS: dict[int, Callable[[bytes, int], bytes]] = {
     1: lambda data, _most: data,
     5: _lzw,
-    8: _inflated,
-    32946: _inflated,
+    **dict.fromkeys((8, 32946), _inflated),
     32773: _packed,
     34925: lambda data, most: lzma.LZMADecompressor().decompress(data, most + 1),
 }

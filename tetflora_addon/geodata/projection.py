@@ -308,14 +308,11 @@ def _oblique(
 #: Functions that make the two ways of a method from its ellipsoid and angles, a factor last.
 METHODS: dict[str, Callable[..., tuple[_Way, _Way]]] = {
     "tm": _transverse,
-    "lcc1": _lambert,
-    "lcc2": _lambert,
+    **dict.fromkeys(("lcc1", "lcc2"), _lambert),
     "aea": _albers,
     "sterea": _double,
-    "stereA": _polar,
-    "stereB": _polar,
-    "mercA": _mercator,
-    "mercB": _mercator,
+    **dict.fromkeys(("stereA", "stereB"), _polar),
+    **dict.fromkeys(("mercA", "mercB"), _mercator),
     "web": lambda ell, *_: _mercator(ell, 0.0, 0.0),
     "laea": _azimuthal,
     "omercA": _oblique,
