@@ -134,10 +134,7 @@ def own_leaf_integrals(
 
 
 def _integral(values: Floats) -> Floats:
-    """Integral (n,) of values (n, nodes) over the interval.
-
-    Not a product of matrices: the last bit of those depends on which rows there are beside.
-    """
+    """Integral (n,) of values (n, nodes) over the interval: no product of matrices, as its last bit varies with n."""
     return sum(values[:, node] * weight for node, weight in enumerate(_WEIGHTS))
 
 
@@ -218,19 +215,15 @@ def average(rows: Table, leaf: RowLeaves) -> Averages:
 
 @dataclass(frozen=True)
 class _Sums:
-    """Expected sums over the children of one sort of a branch of vigor 1.
-
-    ``number`` of them; ``full``, the sum of the factors on their own numbers (`growth.fullness`); ``wood`` and
-    ``full_wood``, the sums of length × radius relative to the parent's (of short shoots in m²), without and with that
-    factor; ``nodes`` (3, 3), what their totals at `NODES` add to the parent's; ``length`` and ``radius``, typical ones
-    relative to the parent's.
-    """
+    """Expected sums over the children of one sort of a branch of vigor 1."""
 
     number: float
-    full: float
+    full: float  # of the factors on their own numbers (`growth.fullness`)
+    #: wood and full_wood: of length × radius relative to the parent's (short shoots: m²), without and with that factor.
     wood: float
     full_wood: float
-    nodes: Floats
+    nodes: Floats  # (3, 3): what their totals at `NODES` add to the parent's
+    #: length and radius: typical ones relative to the parent's.
     length: float
     radius: float
 

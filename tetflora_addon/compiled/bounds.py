@@ -79,10 +79,7 @@ def own_leaf_reaches(rows: Table, model_reach: Floats) -> Floats:
 
 
 def _tilted(bound: NDArray, angle: NDArray, scale: NDArray) -> tuple[NDArray, NDArray, NDArray]:
-    """Radius, lowest and highest z of scaled cylinders tilted by angles; the cylinders contain their base point.
-
-    ``angle`` is (m, a), samples of the interval that each may take; ``scale`` is (m,).
-    """
+    """Radius, lowest and highest z of cylinders scaled by (m,) and tilted by any angles (m, a), with their base."""
     radius, z0, z1 = bound
     sin, cos = np.sin(angle), np.cos(angle)
     reach = max(z1, -z0)

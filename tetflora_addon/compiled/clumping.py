@@ -98,10 +98,7 @@ def cell_numbers(points: Sequence[Floats], shape: Integers) -> Integers:
 
 
 def _path_lengths(origin: Floats, direction: Floats, shape: Integers) -> tuple[Integers, Integers, Floats]:
-    """Ways of parallel rays from origins (n, 3) through the tetrahedra of a lattice of so many cubes along each axis.
-
-    Ray, cell and length (m,) of each part; lengths and origins are in cubes.
-    """
+    """Ray, cell and length (m,) of parts of parallel rays from origins (n, 3) in a lattice of tetrahedra; in cubes."""
     steep = np.where(np.abs(direction) < 1e-9, 1e-9, direction)
     ends = np.sort(np.stack([-origin / steep, (shape - origin) / steep]), axis=0)
     enter, leave = ends[0].max(axis=1), ends[1].min(axis=1)

@@ -40,10 +40,7 @@ from .samples import LIMB, STEM, STEM_LIMB, Limbs, Points, Samples, Shares, draw
 
 
 def _in_summer(compute: "Callable[[Flora], Any]") -> Any:
-    """A property that is found out once when first asked for, of the flora in summer without wind.
-
-    Only proxies need what takes rays or samples to know, and few scenes have crown shapes.
-    """
+    """A property of the flora in summer without wind that few scenes need, and that is found when first asked for."""
     name = compute.__name__
     return cached_property(lambda flora: compute(flora) if flora.in_leaf is flora else getattr(flora.in_leaf, name))
 
@@ -405,11 +402,8 @@ def placed_samples(
 def _moved(
     rows: Table, tree: Branches, on: Limbs, place: Floats, which: Integers, light: Floats
 ) -> tuple[Floats, Floats, Floats]:
-    """Places (m, 3) of samples on limbs, ``which`` (m,) of sub-plants (n,), in lengths of those as described.
-
-    ``light`` (m, 2) is where crowns reach farther.
-
-    Also how far the limbs reach over what they do as described (m,), and how many of them are left (n, 4) by class.
+    """Places (m, 3) of samples on limbs, ``which`` (m,) of sub-plants (n,), in lengths of those as described; how far
+    limbs reach over what they do then (m,), more in the ``light`` (m, 2); and how many are left (n, 4) by class.
     """
     row, root = tree.row, np.where((on.kind >= LIMB)[:, None], on.root, place)
     crown = tree.crown.astype(np.float64)
@@ -447,10 +441,7 @@ def _moved(
 def _other_lengths(
     rows: Table, tree: Branches, which: Integers, root: Floats, height: Floats, stem: Mask
 ) -> Floats | float:
-    """Factors (m,) on the lengths of limbs of trunks that fork, because these are higher or lower in the crown.
-
-    ``height`` (m,) is where limbs at ``root`` (m, 3) are on the trunk, if they are not on a ``stem`` (m,).
-    """
+    """Factors (m,) on limbs' lengths as these, at ``root`` (m, 3), are at another ``height`` (m,) or on a ``stem``."""
     if not ((rows["next"][tree.row, FORK] >= 0) | rows["continues"][tree.row]).any():
         return 1.0
     first = np.flatnonzero(np.diff(rows["species"], prepend=-1))[rows["species"][tree.row]]

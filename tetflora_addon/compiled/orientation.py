@@ -71,10 +71,7 @@ def wood_moments(orientation: Orientation, subplants: Branches) -> Floats:
 
 
 def _evaluated(coefficients: Floats, row: Integers, frame: Floats, outward: Floats) -> Floats:
-    """Moments (n, 3, 3) in the world for branches with frames (n, 3, 3), so far outside in the crown (n,).
-
-    By polynomials (r, 1, 33, 6) of rows (n,), or (r, 3, 33, 6) at `NODES`.
-    """
+    """Moments (n, 3, 3) of branches with frames (n, 3, 3), from polynomials (r, 1 or 3 `NODES`, 33, 6) of rows (n,)."""
     basis = _basis(frame[:, 2, :])
     local = np.zeros((len(row), 6))
     for r in np.unique(row):
@@ -167,8 +164,7 @@ def orientation_of(rows: Table, forms: Sequence[Forms], leaf: Floats, wood: Floa
                 leaves = branch_leaves.mixed(leaves, leaf[i, i] / leaf_area[i])
                 knots = np.stack([branches.position, branches.position + branches.frame[:, :, 2]], axis=1)
                 straight = Axes(knots, branches.frame[:, None], np.ones(len(branches), np.int64))
-                straight_leaves = _own_leaves(rows, branches, straight, turn[i], place)
-                out.own_leaves[i, node] = straight_leaves.fitted(branches, basis)
+                out.own_leaves[i, node] = _own_leaves(rows, branches, straight, turn[i], place).fitted(branches, basis)
             out.leaves[i, node] = leaves.fitted(branches, basis)
         weight = stands * children.length * children.radius * wood_area[row]
         bark = _Sums.of(len(branches), owner, _evaluated(out.wood, row, children.frame, children.outward), weight)
@@ -250,10 +246,7 @@ def _sample_branches(row: int, length: float, sky: Floats) -> Branches:
 
 
 def _some_children(rows: Table, branches: Branches, lines: Axes) -> tuple[Branches, Integers, Floats]:
-    """One child of each sort of each branch that has any: the children, their parents, and how many each stands for.
-
-    Of plants that are drawn by hand all branches that are drawn.
-    """
+    """One child of each sort of branches, or all that are drawn by hand; parents, and how many each stands for."""
     if rows["phantom"][branches.row[0]]:
         children, owner = drawn_children(rows, branches)
         return children, owner, np.ones(len(owner))
@@ -282,8 +275,7 @@ def _own_leaves(rows: Table, branches: Branches, lines: Axes, turn: Floats, plac
     owner, each = np.repeat(bearers, leaves), np.tile(np.arange(leaves), len(bearers))
     number = counts[owner]
     # Evenly over the leaves of each branch, beginning anywhere.
-    part = (uniform(branches.key, _CHILD)[owner] + each / leaves) % 1.0
-    index = (part * number).astype(np.int64)
+    index = ((uniform(branches.key, _CHILD)[owner] + each / leaves) % 1.0 * number).astype(np.int64)
     if rows["leaf_spray"][row[0]] > 0:  # one leaf after the other, so that both sides of the spray have as many
         index = (index - index % _LEAVES + each) % number
     key = foliage.leaf_keys(branches, owner, index)

@@ -127,10 +127,7 @@ def of_dense_stand(species: Species) -> Species:
 def sized(
     seeds: Seeds, ages: Floats | None, sizes: Sizes | None, find: Callable[[str], Species | None]
 ) -> tuple[Seeds, Floats | None]:
-    """Plants (n,) of kinds that suit their recorded sizes, and the ages that are left to the others.
-
-    Species that ``find`` does not find are left as they are, which is told elsewhere.
-    """
+    """Plants (n,) of kinds that suit recorded sizes, and ages left to others; unknown species stay as they are."""
     if sizes is None:
         return seeds, ages
     kinds, number = list(seeds.identifiers), seeds.species.copy()
@@ -189,10 +186,7 @@ def kinds_of_sizes(species: Species, sizes: Sizes) -> list[Species]:
 
 
 def _stages(species: Species, sizes: Sizes, number: int) -> Floats:
-    """Age, years since death and whether it is crowded (n, 3), of the kind that each plant belongs to.
-
-    ``number`` is that of their kind in the field.
-    """
+    """Age, years since death, and whether it is crowded (n, 3), of the kind of each plant by its ``number``."""
     ages = ages_of(species)
     full = measure_of(species).height
     dead, height = sizes.dead, np.where(sizes.height > 0.0, sizes.height, full)

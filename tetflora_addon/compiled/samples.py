@@ -122,15 +122,11 @@ def _at_least_some(counts: Integers) -> Integers:
 
 @dataclass
 class _Points(Arrays):
-    """Sample points on branches of one row or several; shapes as in `Points`.
+    """Sample points on branches of one row or several; shapes as in `Points`."""
 
-    ``line`` (n, slots) gives the branches that the point is on, see `_Walk`; ``offset`` (n, 3) is the part of the
-    position that does not follow the length of the branches that lead there: the way along a short shoot.
-    """
-
-    line: Integers32
+    line: Integers32  # (n, slots): the branches that it is on, see `_Walk`
     position: Floats
-    offset: Floats
+    offset: Floats  # (n, 3): of the position, the way along a short shoot, which follows no branch's length
     frame: NDArray[np.floating]
     row: Integers32
     outward: Floats
@@ -150,14 +146,11 @@ class _Points(Arrays):
 
 @dataclass
 class _Arrived:
-    """Branches of one row that paths have come to.
-
-    ``weight`` (n,) is how many branches each stands for, ``line`` (slots, n) gives those it grows on, see `_Walk`.
-    """
+    """Branches of one row that paths have come to."""
 
     branches: Branches
-    weight: Floats
-    line: Integers32
+    weight: Floats  # (n,): how many branches each stands for
+    line: Integers32  # (slots, n): those it grows on, see `_Walk`
 
 
 class _Walk:

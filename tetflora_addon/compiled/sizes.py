@@ -163,11 +163,8 @@ def _even_parts(crown: Crown) -> CrownParts:
 
 
 def _some(points: Points, row: int, lengths: Floats) -> tuple[Floats, Integers, Floats, Floats]:
-    """Places (n, 3) of samples of upright trunks of lengths (k,), their rows (n,), of how many of its row (n,) each is
-    one, and where leaves point (n, 3).
-
-    Few of large branches, which have most of the samples, so that there are as many of small ones.
-    """
+    """Places (n, 3) of samples of upright trunks of lengths (k,), rows (n,), samples of each row (n,), leaves' ways."""
+    # Few of large branches, which have most of the samples, so that there are as many of small ones.
     first, number = int(points.first[row, -1]), int(points.number[row, -1])
     rows = points.row[first : first + number]
     most = _PARTS // len(np.unique(rows))
@@ -201,8 +198,7 @@ def _branch_parts(flora: Flora, points: Points, row: int, lengths: Floats) -> Cr
     trunk_radius = float(flora.averages.radius[row]) * length / float(flora.averages.length[row])
     totals, bud = flora.averages, flora.species[0].bud
     sides, segments = flora.rows["sides"][rows].astype(np.int64), flora.rows["segments"][rows].astype(np.int64)
-    faces = (totals.fixed_faces + totals.full_faces)[row][rows]
-    number = faces / (sides * (segments + flora.rows["rings"][rows]))
+    number = (totals.fixed_faces + totals.full_faces)[row][rows] / (sides * (segments + flora.rows["rings"][rows]))
     leaves = totals.leaves[row][rows] / np.maximum(number, 1e-300)
     buds = np.zeros(len(rows)) if bud is None else np.where(leaves > 0.0, 1.0 + bud.lateral * leaves, 0.0)
     surface = (totals.fixed_wood + totals.full_wood)[row][rows] * length * trunk_radius + totals.spur_wood[row][rows]
@@ -453,10 +449,8 @@ def _likely(rows: Table, stems: list[tuple[Branches, Axes]], n: int) -> list[tup
 
 
 def _mean_tips(rows: Table, stems: Branches, lines: Axes) -> tuple[Integers, Integers, Integers, Floats32]:
-    """Limbs of stems (n,), stems and numbers (m,) of all limbs, and about where they end (m, 5) in `DIRECTIONS`.
-
-    As `growth.chosen_children` has it, but for what differs at random from limb to limb.
-    """
+    """Limbs of stems (n,), stems and numbers (m,) of all limbs, and about where they end (m, 5) in `DIRECTIONS`."""
+    # As `growth.chosen_children` has it, but for what differs at random from limb to limb.
     counts = branch_counts(rows, stems)
     owner, index = spread(counts)
     row, child = stems.row, np.maximum(rows["next"][stems.row, LATERAL], 0)

@@ -337,10 +337,7 @@ class _Tile(Canvas):
         self._leave_out(self.number - most)
 
     def _following(self, expected: float, known: bool) -> float:
-        """Polygons and facets that are still to be drawn, with the sides of the drawing.
-
-        Those that were drawn before, and the pixels that they left open, tell how many are needed for each layer.
-        """
+        """Polygons and facets still to be drawn, by those drawn before for each layer, and the pixels left open."""
         if known:
             return max(expected - self.asked, _EXPECTED / _LAYERS * expected)
         layers = self.frontier.layers()
@@ -445,10 +442,8 @@ class _Tile(Canvas):
         self._draw_unseen(pools, sides, most, False)
 
     def _add_hidden(self, facets: Facets, whose: Whose) -> None:
-        """Facets of hidden parts, smaller until they lie behind full pixels; what would show even so is left out.
-
-        Where light reaches them they are divided; in the shade each shrinks: what lies before it keeps the light out.
-        """
+        """Facets of hidden parts, smaller until they lie behind full pixels; what would show even so is left out."""
+        # Where light reaches them they are divided; in the shade each shrinks: what lies before it keeps the light out.
         dark = self.given.shade.depth(facets.center) > SHADED
         while len(facets):
             hidden = self._hidden(facets)
@@ -500,10 +495,8 @@ class _Tile(Canvas):
     def _draw_unseen(
         self, pools: list[Waiting], sides: list[Floats], most: float, outside: bool, leaves: float = HIDDEN_LEAVES
     ) -> None:
-        """Facets of parts that nobody sees, of sides (n,) in meters or so many leaves; about so many at most.
-
-        Were there more, they are larger; where they would be larger than the largest, some parts have none.
-        """
+        """Facets of parts that nobody sees, of sides (n,) in meters or so many leaves; about so many at most."""
+        # Were there more, they are larger; where they would be larger than the largest, some parts have none.
         largest = LARGEST_OUTSIDE if outside else np.inf
         drawn = []
         for kind, pool, side in zip(self.given.kinds, pools, sides, strict=True):

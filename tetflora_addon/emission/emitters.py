@@ -164,8 +164,7 @@ def shell_blocks(refined: EmissionInput, light: BakedLight | None = None, _first
 
 def baked_facet_blocks(given: EmissionInput, light: BakedLight, first: int, round_: bool = False) -> Iterator[Buffers]:
     """Facets, or a sphere for each, with baked light, in which the first of them is that sheet."""
-    sun = sun_of(given.refinement.lights)
-    form = FacetForm(given.camera, given.disc, sun, (True, False) if round_ else ())
+    form = FacetForm(given.camera, given.disc, sun_of(given.refinement.lights), (True, False) if round_ else ())
     for parts in given.facet_parts():
         facets = joined([group for group, _ in parts])
         sheets = np.arange(first, first + len(facets))

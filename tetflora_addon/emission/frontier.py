@@ -286,10 +286,7 @@ class Frontier:
                 yield ready
 
     def _depths(self, pools: Sequence[_Pool], number: float) -> tuple[Floats, Floats, Integers, int]:
-        """Least depths (n,) of parts, and those before which they have so many facets in each cell, about.
-
-        Also their order (n,) by cell and depth, and how many cells there are.
-        """
+        """Least depths (n,) of parts, those before which a cell has so many facets, order (n,) by both, and cells."""
         names = ("cell", "near", "count", "radius")
         every, nearest, count, radius = (np.concatenate([pool.column(name) for pool in pools]) for name in names)
         self._filling = -np.expm1(-np.append(np.bincount(every, count * self.facet**2), 0.0) / CELL**2)

@@ -74,10 +74,7 @@ class LeafDetail:
         return Pixels(lambda points, reach: coarser * self._extent(points, reach), coarser * slope)
 
     def lengths(self, whole: WholeBranches) -> Floats:
-        """Lengths (n,) of the leaves of branches in tolerances, where they come nearest.
-
-        0 where the models of the species are certainly fine enough.
-        """
+        """Lengths (n,) of leaves of branches in tolerances, where they come nearest; 0 where models are fine enough."""
         branches, camera = whole.branches, self.camera
         out = np.zeros(len(branches))
         forms = ([f for kind in range(len(LEAF_KINDS)) for f in models[kind]] for models in self.flora.forms)
@@ -191,10 +188,7 @@ class Block:
 def inside_explicit(
     shared: SharedParts, result: Refinement, opening: Callable[[Arrays, Floats], Mask]
 ) -> tuple[Arrays, Floats]:
-    """All parts (n) of one kind, and the fraction (n,) of each that lies in explicit tetrahedra.
-
-    Those of which something does are opened where ``opening`` wants it of parts and these fractions.
-    """
+    """All parts (n) of one kind, opened where ``opening`` wants it, and the fraction (n,) in explicit tetrahedra."""
     explicit, shared = result.chosen(Decision.EXPLICIT), copy(shared)
     shared.hold(shared.parts, SharePoints.concatenate([shared.points]))  # those of the refinement stay as they are
     while True:
@@ -389,10 +383,7 @@ class GrownPlants(FrontierKind):
     def _rules(
         self, branches: Branches, side: Floats, alone: bool, explicit: Floats | None = None, thin: Thin | None = None
     ) -> FacetRules:
-        """How facets of sides (n,), meters, are made of branches (n,) alone or with all that grows on them.
-
-        A fraction (n,) of their leaves is real. Only those that are seen are thinned out and lit as these.
-        """
+        """How facets of sides (n,), meters, are made of branches (n,) beside real leaves; ``thin`` is of seen ones."""
         flora = self.flora
         leaf = np.maximum(side, np.sqrt(flora.one_leaf_area(branches)))
         count = (flora.leaf_areas(branches) + flora.wood_areas(branches) / 2) / np.maximum(leaf, 1e-12) ** 2

@@ -127,10 +127,7 @@ def _stays(rows: FaceRows, side: Floats) -> Mask:
 
 
 def chosen_facets(polygons: Polygons, optical: Floats, side: Floats) -> Facets:
-    """Facets of whole faces (n,) that stand for an area ``optical`` (n,) in m², with sides (n,) in meters.
-
-    Their number is random; its expectation is the area over that of a facet.
-    """
+    """Facets of sides (n,), meters, for areas ``optical`` (n,), m², of whole faces (n,): on average as many as fit."""
     meshes = polygons.meshes
     owner, triangle, _ = polygons.triangles()
     vector, key = meshes.vectors(triangle, polygons.instance[owner]), key_of_seed(polygons.instance)[owner]
@@ -192,7 +189,10 @@ def polygon_buffers(polygons: Polygons) -> MeshBuffers:
     meshes = polygons.meshes
     cut = polygons.part >= 0
     whole, pieces = polygons.take(~cut), polygons.take(cut)
-    corner, instance, size = _face_corners(whole)
+    size = meshes.face_size[whole.face]
+    owner, index = spread(size)
+    index = np.where(meshes.mirrored[whole.instance][owner], size[owner] - 1 - index, index)
+    corner, instance = meshes.face_start[whole.face][owner] + index, whole.instance[owner]
     # Corners of faces with a vertex twice get vertices of their own, which keeps the mesh valid.
     own_place = np.repeat(meshes.degenerate[whole.face], size)
     count = len(meshes.positions)
@@ -237,15 +237,6 @@ def polygon_buffers(polygons: Polygons) -> MeshBuffers:
         attributes=attributes,
         smooth=shown.normals is not None,
     )
-
-
-def _face_corners(whole: Polygons) -> tuple[Integers, Integers32, Integers]:
-    """Corners (c,) of faces, the instance (c,) of each, and how many (f,) each face has."""
-    meshes = whole.meshes
-    size = meshes.face_size[whole.face]
-    owner, index = spread(size)
-    index = np.where(meshes.mirrored[whole.instance][owner], size[owner] - 1 - index, index)
-    return meshes.face_start[whole.face][owner] + index, whole.instance[owner], size
 
 
 def _at_corners(values: NDArray, corner: Integers, triangle: Integers, weights: Floats) -> Floats:

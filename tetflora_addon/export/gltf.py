@@ -35,12 +35,8 @@ class _Document:
 
     def __init__(self, file: Any) -> None:
         self.file, self.bytes = file, 0
-        self.json: dict[str, Any] = {
-            "asset": {"version": "2.0", "generator": "TetFlora"},
-            "scene": 0,
-            "scenes": [{"name": "Forest", "nodes": []}],
-            "nodes": [],
-        }
+        asset, scene = {"version": "2.0", "generator": "TetFlora"}, {"name": "Forest", "nodes": []}
+        self.json: dict[str, Any] = {"asset": asset, "scene": 0, "scenes": [scene], "nodes": []}
 
     def add(self, key: str, what: dict[str, Any]) -> int:
         """Append to a list of the document; its index."""
@@ -59,13 +55,9 @@ class _Document:
         """Write an array (n,) or (n, k) of float32, uint32 or uint8; the index of its accessor."""
         values = np.ascontiguousarray(values)
         kind = {np.dtype(np.float32): _FLOAT, np.dtype(np.uint32): _INT, np.dtype(np.uint8): _BYTE}[values.dtype]
-        more: dict[str, Any] = {} if target is None else {"target": target}
-        accessor = {
-            "bufferView": self.data(values.tobytes(), **more),
-            "componentType": kind,
-            "count": len(values),
-            "type": _TYPES[1 if values.ndim == 1 else values.shape[1]],
-        }
+        view = self.data(values.tobytes(), **({} if target is None else {"target": target}))
+        shape = _TYPES[1 if values.ndim == 1 else values.shape[1]]
+        accessor = {"bufferView": view, "componentType": kind, "count": len(values), "type": shape}
         if bounds:
             accessor |= {"min": values.min(axis=0).tolist(), "max": values.max(axis=0).tolist()}
         return self.add("accessors", accessor)

@@ -87,8 +87,7 @@ def in_atlas(level: PlantLevel, palettes: dict[str, Palette]) -> PlantLevel:
 def outline(palette: Palette, mesh: MeshBuffers, faces: int = 4000) -> NDArray[np.bool_]:
     """Texels (t, t) of a cell that some faces of a mesh cover."""
     owner, corner = corner_triangles(mesh)
-    sampled = owner < faces
-    uv = palette.placed(mesh.attributes["UVMap"][1], np.zeros(len(mesh.corner_verts), np.int64))[corner[sampled]]
+    uv = palette.placed(mesh.attributes["UVMap"][1], np.zeros(len(mesh.corner_verts), np.int64))[corner[owner < faces]]
     shown = np.zeros((TEXELS, TEXELS), bool)
     flat = np.unique(np.round(uv * (np.array(palette.grid) * TEXELS) - 0.5, 2), axis=0)
     for a, b, c in flat:

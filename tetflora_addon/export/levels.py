@@ -358,7 +358,6 @@ def triangles(mesh: MeshBuffers) -> tuple[Integers, Integers]:
 
 def _axes(toward: Floats) -> Floats:
     """Columns (3, 3): to the right and up as seen from a direction (3,), and that itself."""
-    upright = abs(toward[2]) < 0.99
-    right = np.cross([0.0, 0.0, 1.0], toward) if upright else perpendicular(toward[None])[0]
+    right = np.cross([0.0, 0.0, 1.0], toward) if abs(toward[2]) < 0.99 else perpendicular(toward[None])[0]
     right = right / np.linalg.norm(right)
     return np.stack([right, np.cross(toward, right), toward], axis=1)

@@ -8,7 +8,7 @@ of sun and sky. Which sides are lit and seen is counted in views of the plant, w
 send on to each other is scattered again (see `optics`): what passes through counts there too, seen or not.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -75,7 +75,12 @@ def _sides(meshes: Sequence[MeshBuffers]) -> Floats:
     points, normal = (np.concatenate(of) for of in ([m.positions for m in meshes], [face_normals(m) for m in meshes]))
     part = np.repeat(np.arange(len(meshes)), [mesh.polygons for mesh in meshes])
     cell = float(np.ptp(points, axis=0).max()) / _CELLS
-    lamps = [(Grid.around(toward, cell, points, cell), *more) for toward, *more in _lamps()]
+    # Of each, the irradiance of what faces it, and what of it shadows let through.
+    lamps = [
+        (Grid.around(toward, cell, points, cell), level / np.abs(z).sum(), passing)
+        for z, level, passing in _LIGHT
+        for toward in spiral(z, np.arange(len(z)))
+    ]
     shadows = [lamp.nearest(meshes)[0] for lamp, *_ in lamps]
     lit, every = np.zeros((3, len(meshes))), np.zeros(len(meshes))
     for grid in (Grid.around(toward, cell, points, cell) for toward in _VIEWS):
@@ -90,9 +95,3 @@ def _sides(meshes: Sequence[MeshBuffers]) -> Floats:
             np.add.at(every, part[face], light)
     shaded = 1.0 - lit.sum(axis=0) / np.maximum(every, 1e-30)
     return np.column_stack([*(lit / np.maximum(lit[:2].sum(axis=0), 1e-30)), shaded])
-
-
-def _lamps() -> Iterator[tuple[Floats, float, float]]:
-    """Directions (3,) to light, the irradiance from each of what faces it, and what of it shadows let through."""
-    for z, level, passing in _LIGHT:
-        yield from ((toward, level / np.abs(z).sum(), passing) for toward in spiral(z, np.arange(len(z))))

@@ -234,10 +234,8 @@ class _Tags:
         if bits == 1 and self.one("NewSubfileType", 0) & 4:
             return np.dtype(bool)
         if bits not in sizes:
-            raise self.broken(
-                "BitsPerSample",
-                f"is {bits}, of format {form}; write 32-bit floats, for example with gdal_translate -ot Float32",
-            )
+            remedy = "write 32-bit floats, for example with gdal_translate -ot Float32"
+            raise self.broken("BitsPerSample", f"is {bits}, of format {form}; {remedy}")
         return np.dtype(f"{self.order}{letter}{bits // 8}")
 
     def mask(self, shape: tuple[int, int]) -> Job[Mask]:
@@ -346,22 +344,17 @@ class _Tags:
 
 
 def _decoded(rows: NDArray[np.uint8], dtype: np.dtype[Any], samples: int, predictor: int) -> NDArray[Any]:
-    """First sample of the pixels of a piece, from the bytes (h, n) of its rows."""
+    """First sample of the pixels of a piece, from the bytes (h, n) of its rows; sums wrap around beyond the largest."""
     if dtype.kind == "b":
         return np.unpackbits(rows, axis=1)[:, ::samples]
     size, native = dtype.itemsize, dtype.newbyteorder("=")
     if predictor == 3:  # bytes apart by their weight, the highest first, each as the difference from the one before
-        rows = _running(rows.reshape(len(rows), -1, samples)).reshape(len(rows), size, -1)
+        rows = rows.reshape(len(rows), -1, samples).cumsum(axis=1, dtype=rows.dtype).reshape(len(rows), size, -1)
         return np.ascontiguousarray(rows.transpose(0, 2, 1)).view(dtype.newbyteorder(">"))[:, ::samples, 0]
     if predictor == 2:
         whole = rows.view(f"{dtype.byteorder}u{size}" if size > 1 else np.uint8).astype(f"u{size}")
-        return _running(whole.reshape(len(rows), -1, samples)).view(native)[:, :, 0]
+        return whole.reshape(len(rows), -1, samples).cumsum(axis=1, dtype=whole.dtype).view(native)[:, :, 0]
     return rows.view(dtype)[:, ::samples]
-
-
-def _running(values: NDArray[Any]) -> NDArray[Any]:
-    """Sums along rows that begin anew after the largest number."""
-    return np.cumsum(values, axis=1, dtype=values.dtype)
 
 
 #: Bytes by those with the lowest bit first.
@@ -419,8 +412,7 @@ def _strings(codes: Integers) -> tuple[bytes, bool]:
     length = steps + 1
     start = np.cumsum(length) - length
     code, offset = spread(length)
-    source = start[maker[code]] + offset
-    return codes[code[top(source)]].astype(np.uint8).tobytes(), bool(len(bad))
+    return codes[code[top(start[maker[code]] + offset)]].astype(np.uint8).tobytes(), bool(len(bad))
 
 
 def _packed(data: bytes, most: int) -> bytes:
@@ -442,8 +434,7 @@ def _inflated(data: bytes, most: int) -> bytes:
 _READERS: dict[int, Callable[[bytes, int], bytes]] = {
     1: lambda data, _most: data,
     5: _lzw,
-    8: _inflated,
-    32946: _inflated,
+    **dict.fromkeys((8, 32946), _inflated),
     32773: _packed,
     34925: lambda data, most: lzma.LZMADecompressor().decompress(data, most + 1),
 }

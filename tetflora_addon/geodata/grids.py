@@ -52,16 +52,14 @@ def read_grid(path: Path) -> Job[Raster]:
 
 def _hgt(path: Path) -> Raster:
     """A tile of a degree; its name tells its south-western corner."""
-    match = re.match(r"([NS])(\d{1,2})([EW])(\d{1,3})", path.stem, re.IGNORECASE)
+    name, match = path.name, re.match(r"([NS])(\d{1,2})([EW])(\d{1,3})", path.stem, re.IGNORECASE)
     if not match:
-        raise SceneError(f"{path.name}: a .hgt file has its place in its name, such as N48E009.hgt; name it so")
+        raise SceneError(f"{name}: a .hgt file has its place in its name, such as N48E009.hgt; name it so")
     content = read_whole(path, 4 * 10**8)
     side = round((len(content) / 2) ** 0.5)
     if side < 2 or 2 * side * side != len(content):
-        raise SceneError(
-            f"{path.name}: {len(content):,} bytes are no square of 16-bit values; it is damaged; get it again"
-        )
-    checked_size(side, side, f"{path.name}: ")
+        raise SceneError(f"{name}: {len(content):,} bytes are no square of 16-bit values; it is damaged; get it again")
+    checked_size(side, side, f"{name}: ")
     south, west = (int(match[k + 1]) * (-1 if match[k].upper() in "SW" else 1) for k in (1, 3))
     values = np.frombuffer(content, ">i2").reshape(side, side).astype(np.float32)
     step = 1.0 / (side - 1)

@@ -127,10 +127,7 @@ def _parts(word: str) -> list[str]:
 
 
 def _field(meant: set[str]) -> tuple[str, int]:
-    """The field that meanings of words make up, and the doubt, by the first rule that fits.
-
-    Of a rule ``a|b !c =d|e`` there is one of a and b, no c, and nothing but d and e.
-    """
+    """Field and doubt by the first rule that fits: of ``a|b !c =d|e`` one of a and b, no c, nothing but d and e."""
     for rule, name, doubt in _TABLE["rules"]:
         parts = [(part[0], meant.intersection(part.lstrip("!=").split("|"))) for part in rule.split()]
         if all(common == meant if way == "=" else bool(common) != (way == "!") for way, common in parts):
@@ -147,11 +144,9 @@ def _values() -> dict[tuple[str, ...], str]:
 
 @cache
 def said_of(text: str) -> str:
-    """What a cell says of a tree: ``dead``, ``vacant``, ``stump``, ``planned``, ``removed``, or ``yes``; else nothing.
-
-    "Dead" and "dead tree" say it, "dead branches" does not; after "vacant" anything may stand.
-    """
+    """What a cell says of a tree: ``dead``, ``vacant``, ``stump``, ``planned``, ``removed``, ``yes`` or nothing."""
     words, rest = tuple(plain_words(text)), set(_TABLE["values"]["rest"].split())
+    # "Dead" and "dead tree" say it, "dead branches" does not; after "vacant" anything may stand.
     for end in range(min(len(words), 4), 0, -1):
         what = _values().get(words[:end], "")
         if what and (what in ("vacant", "stump", "planned") or rest.issuperset(words[end:])):
@@ -248,10 +243,8 @@ def _table(path: Path, skip: bool, most: int | None = None, epsg: int = 0) -> Ta
     layer = path.suffix.lower() in ENDINGS
     table_ = read_points(path, skip, most, epsg) if layer else read_csv(path, skip, most)
     if not len(table_.numbers):
-        raise SceneError(
-            table_.first
-            or f"{table_.name}: it has no {'points' if table_.points is not None else 'rows'}; choose another one"
-        )
+        rows = "rows" if table_.points is None else "points"
+        raise SceneError(table_.first or f"{table_.name}: it has no {rows}; choose another one")
     return table_
 
 
@@ -364,9 +357,8 @@ class _Reading:
         points, system = self._points(epsg)
         names, index = self._names()
         if not self.good.any():
-            raise SceneError(
-                self.first or f"{self.table.name}: none of its rows is a tree that can be used; choose another one"
-            )
+            none = f"{self.table.name}: none of its rows is a tree that can be used; choose another one"
+            raise SceneError(self.first or none)
         kept = {name: values[self.good].astype(np.float32) for name, values in sizes.items()}
         if not any(values.any() for values in (kept["height"], kept["diameter"], kept["crown_width"], kept["age"])):
             self.notes.append("no column of heights, trunks or crowns: all trees are full-grown")
@@ -376,9 +368,8 @@ class _Reading:
         if unused:
             self.notes.append(f"columns not used: {', '.join(unused)}")
         skipped = int((~self.good).sum()) - self.left_out.total() + self.table.broken
-        return Inventory(
-            names, index[self.good], points[self.good], system, kept, self.notes, skipped, self.first, self.left_out
-        )
+        trees = names, index[self.good], points[self.good], system, kept
+        return Inventory(*trees, self.notes, skipped, self.first, self.left_out)
 
     def _texts(self, title: str) -> _Texts:
         """Texts of a column, which is one that is used."""
@@ -440,12 +431,9 @@ class _Reading:
         elif len(known) and np.median(known) > 1500.0:  # years of planting
             self.found.setdefault("planted", []).append((title, what))
             return np.zeros(len(self.good))
-        most = _MOST[name]
-        self._refuse(
-            ~((values >= 0.0) & (values <= most)),
-            name,
-            lambda i: f"{quoted(str(texts[i]))} is not from 0 to {most:,.0f} {'years' if name == 'age' else 'm'}",
-        )
+        beyond = ~((values >= 0.0) & (values <= _MOST[name]))
+        limits = f"0 to {_MOST[name]:,.0f} {'years' if name == 'age' else 'm'}"
+        self._refuse(beyond, name, lambda i: f"{quoted(str(texts[i]))} is not from {limits}")
         return np.where(self.good, values, 0.0)
 
     def _guess(self, title: str, name: str, known: Floats) -> float:
@@ -515,11 +503,9 @@ class _Reading:
             if len(amount) and 90.0 < np.median(amount[:, 1]) <= 180.0 and np.median(amount[:, 0]) <= 90.0:
                 points = points[:, ::-1]
                 self.notes.append("coordinates read as latitude, longitude")
-            self._refuse(
-                ~((points >= (-360.0, -90.0)) & (points <= (360.0, 90.0))).all(axis=1),
-                pair[0],
-                lambda i: f"{points[i, 0]:g}, {points[i, 1]:g} are no longitude and latitude; set Coordinate System",
-            )
+            beyond = ~(np.abs(points) <= (360.0, 90.0)).all(axis=1)
+            told = "are no longitude and latitude; set Coordinate System"
+            self._refuse(beyond, pair[0], lambda i: f"{points[i, 0]:g}, {points[i, 1]:g} {told}")
         self._refuse_far(points, system, pair[0])
         return points, system
 

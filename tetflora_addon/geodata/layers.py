@@ -28,9 +28,8 @@ MAX_BYTES, MAX_ROWS = 200_000_000, 2_000_000
 ENDINGS = (".geojson", ".json", ".geojsonl", ".geojsons", ".ndjson", ".shp", ".gpkg")
 #: On features: the layer that they come from.
 LAYER = "layer"
-_GEOMETRIES = {
-    "Point", "MultiPoint", "LineString", "MultiLineString", "Polygon", "MultiPolygon", "GeometryCollection",
-}  # fmt: skip
+_SINGLE = ("Point", "LineString", "Polygon")
+_GEOMETRIES = {*_SINGLE, *(f"Multi{kind}" for kind in _SINGLE), "GeometryCollection"}
 _DEEPEST = 32  # collections within each other
 _Feature = dict[str, Any]
 
@@ -80,9 +79,8 @@ def read_features(path: Path, chosen: int = 0) -> tuple[list[_Feature], System]:
         geometry = feature.get("geometry", ...) if isinstance(feature, dict) else ...
         properties = feature.get("properties") if isinstance(feature, dict) else None
         if not isinstance(geometry, dict | None) or not isinstance(properties, dict | None):
-            raise SceneError(
-                f"{name}: feature {number:,}: it has no geometry, or properties that are no object; correct it"
-            )
+            problem = "it has no geometry, or properties that are no object"
+            raise SceneError(f"{name}: feature {number:,}: {problem}; correct it")
         if geometry is not None and not isinstance(geometry.get("type"), str):
             raise SceneError(f"{name}: feature {number:,}: its geometry has no type; correct it")
     return features, chosen_system(chosen or _code(data.get("crs"), name), System(), f"{name}: ")
@@ -341,5 +339,4 @@ def _binary(file: BytesIO, depth: int = 0) -> _Feature | None:
     parts = [part for _ in range(many) if (part := _binary(file, depth + 1))]
     if kind == 7:
         return {"type": "GeometryCollection", "geometries": parts}
-    names = {4: "MultiPoint", 5: "MultiLineString", 6: "MultiPolygon"}
-    return {"type": names[kind], "coordinates": [part["coordinates"] for part in parts]}
+    return {"type": f"Multi{_SINGLE[kind - 4]}", "coordinates": [part["coordinates"] for part in parts]}

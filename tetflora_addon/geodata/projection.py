@@ -308,14 +308,11 @@ def _oblique(
 #: Functions that make the two ways of a method from its ellipsoid and angles, a factor last.
 METHODS: dict[str, Callable[..., tuple[_Way, _Way]]] = {
     "tm": _transverse,
-    "lcc1": _lambert,
-    "lcc2": _lambert,
+    **dict.fromkeys(("lcc1", "lcc2"), _lambert),
     "aea": _albers,
     "sterea": _double,
-    "stereA": _polar,
-    "stereB": _polar,
-    "mercA": _mercator,
-    "mercB": _mercator,
+    **dict.fromkeys(("stereA", "stereB"), _polar),
+    **dict.fromkeys(("mercA", "mercB"), _mercator),
     "web": lambda ell, *_: _mercator(ell, 0.0, 0.0),
     "laea": _azimuthal,
     "omercA": _oblique,
@@ -361,12 +358,10 @@ class System:
     @property
     def name(self) -> str:
         """For messages."""
-        if self.epsg > 0:
-            return f"EPSG:{self.epsg}"
-        return {
-            0: "plain meters" if self.unit == 1.0 else f"plain units of {self.unit:g} m",
-            -2: "the system that the file defines",
-        }.get(self.epsg, f"the plane about {self.latitude:.5f}, {self.longitude:.5f}")
+        plain = "plain meters" if self.unit == 1.0 else f"plain units of {self.unit:g} m"
+        about = f"the plane about {self.latitude:.5f}, {self.longitude:.5f}"
+        names = {0: plain, -1: about, -2: "the system that the file defines"}
+        return names.get(self.epsg, f"EPSG:{self.epsg}")
 
 
 @cache
@@ -438,10 +433,7 @@ def to_degrees(system: System, points: Floats) -> Floats:
 
 
 def from_degrees(system: System, points: Floats) -> Floats:
-    """Points (n, 2) of a system that lies on Earth, from longitude and latitude in degrees on WGS 84, (n, 2).
-
-    What is too far from the system's meridian is nan.
-    """
+    """Points (n, 2) of a system on Earth from longitude and latitude (n, 2), degrees on WGS 84; too far off nan."""
     points, definition = np.asarray(points, np.float64), system.definition
     if definition.method == "geo" and not any(definition.shift):
         return points
@@ -522,9 +514,8 @@ def place_about(system: System, low: Floats, high: Floats, what: str = "") -> Ma
     else:
         longitude, latitude = np.round(to_degrees(system, middle[None])[0], 6).tolist()
         if not (abs(longitude) <= 360.0 and abs(latitude) < 89.0):
-            raise SceneError(
-                readable(f"{what}{longitude:g}, {latitude:g} is no longitude and latitude with room about it")
-            )
+            told = f"{what}{longitude:g}, {latitude:g}"
+            raise SceneError(readable(f"{told} is no longitude and latitude with room about it"))
         place = MapOrigin(System(-1, longitude, latitude), 0.0, 0.0)
     ends = np.array([[low[0], middle[1]], [high[0], middle[1]], [middle[0], low[1]], [middle[0], high[1]]])
     sides = between(ends, system, place.system)

@@ -175,17 +175,15 @@ def read_ascii(path: Path) -> Job[Raster]:
             break
         if words:
             if key not in _HEADER or len(words) != 2:
-                raise SceneError(
-                    f"{name}: line {line}: {quoted(' '.join(words))} is no header line of an ASCII grid; correct it"
-                )
+                told = quoted(" ".join(words))
+                raise SceneError(f"{name}: line {line}: {told} is no header line of an ASCII grid; correct it")
             header[key] = _number(words[1], f"{name}: line {line}: {key}")
         start += len(text) + 1
     width, height, corner, dx, dy = _ascii_head(header, name)
     # Each value is at least one digit and a space: a small file is no large grid, whatever its head says.
     if len(content) - start + 1 < 2 * width * height:
-        raise SceneError(
-            f"{name}: its head tells of {width:,} by {height:,} values, more than the file can hold; get it again"
-        )
+        told = f"{width:,} by {height:,} values"
+        raise SceneError(f"{name}: its head tells of {told}, more than the file can hold; get it again")
     values = np.empty(width * height, np.float32)
     done = 0
     while start < len(content):

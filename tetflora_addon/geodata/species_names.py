@@ -88,8 +88,7 @@ def _shorter(word: str) -> Iterator[str]:
 @cache
 def _known() -> _Names:
     """The table, indexed by joined words."""
-    data = table("species_names")
-    known = _Names({}, {}, {}, {}, {}, {}, {})
+    data, known = table("species_names"), _Names(*({} for _ in _Names._fields))
     genera = {words_of(name)[0] for names in data["species"].values() for name in names["scientific"]}
     for family, groups in data["families"].items():
         for kin, genus in names_in(groups):

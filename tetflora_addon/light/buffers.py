@@ -82,8 +82,7 @@ class LightBuffer:
             hit = np.flatnonzero(np.isfinite(end))
             across = camera.pixel_size * camera.width / self.width
             shifted = end[hit] + BIAS * across * (1.0 if camera.kind == "ORTHO" else end[hit])
-            nothing = np.zeros(len(hit))
-            parts.append((np.full(len(hit), -1, np.int32), hit, shifted, nothing, np.full(len(hit), OPAQUE)))
+            parts.append((np.full(len(hit), -1, np.int32), hit, shifted, np.zeros(len(hit)), np.full(len(hit), OPAQUE)))
         if sheets is not None and len(sheets):
             parts += [(owner + np.int32(len(vertices)), *rest) for owner, *rest in self._sheet_fragments(sheets)]
         cell, pixel, entry, thickness, depth = (np.concatenate(arrays) for arrays in zip(*parts, strict=True))
@@ -103,10 +102,7 @@ class LightBuffer:
         self._own_key = own_key[self._by_cell]
 
     def _sheet_fragments(self, sheets: Floats) -> Iterator[tuple[NDArray, ...]]:
-        """Owner, pixel, entry, thickness 0 and optical depth of sheets, some at a time.
-
-        A sheet that covers the fraction c of a pixel lets 1 − c through: its optical depth is −ln (1 − c).
-        """
+        """Owner, pixel, entry, thickness 0 and optical depth −ln (1 − c) of sheets that cover c of a pixel, in runs."""
         across = self.camera.pixel_size * self.camera.width / self.width
         # The view may show part of the scene; where a sheet is not ahead, it would have parts without end.
         center = sheets.mean(axis=1, dtype=np.float64)

@@ -51,12 +51,8 @@ class Surfaces(Arrays):
     dull: Floats | None = None  # (m,): part of the gloss that is lost; None for 0
 
 
-@dataclass(frozen=True)
-class LampBuffers:
-    """A lamp and its buffers: one, six all around, or none where nothing blocks its light."""
-
-    light: Light
-    buffers: list[LightBuffer]
+#: A lamp and its buffers: one, six all around, or none where nothing blocks its light.
+Lamp = tuple[Light, list[LightBuffer]]
 
 
 class Illumination:
@@ -67,7 +63,7 @@ class Illumination:
     clouds : MediumCells of n
     sheets : SurfaceElements
         What blocks light in place of some of the clouds.
-    lamps : list of LampBuffers
+    lamps : list of Lamp
         Area lights are several of them.
     ambient : (n, 4, 9, 3) float32
         Light from the sky and from what is lit, at the tetrahedra's key points, by harmonic and color.
@@ -77,7 +73,7 @@ class Illumination:
         self,
         clouds: MediumCells,
         sheets: SurfaceElements,
-        lamps: list[LampBuffers],
+        lamps: list[Lamp],
         sky: list[LightBuffer | None],
         world: World,
         fewer: tuple[SurfaceElements, Integers],
@@ -109,10 +105,10 @@ class Illumination:
         irradiance : (m, 3) float64
             W/m² that arrive on a surface that faces it, shadows included.
         """
-        for lit in self.lamps:
-            toward, light = arriving(lit.light, points)
-            if lit.buffers:
-                light = light * self._through(lit.buffers, points, cells, toward, sheets)[:, None]
+        for lamp, buffers in self.lamps:
+            toward, light = arriving(lamp, points)
+            if buffers:
+                light = light * self._through(buffers, points, cells, toward, sheets)[:, None]
             yield toward, light
 
     def around(self, points: Floats, cells: Integers) -> Floats:
@@ -131,10 +127,7 @@ class Illumination:
         return result
 
     def facet_radiance(self, surfaces: Surfaces, camera: Camera) -> tuple[Floats32, Floats32]:
-        """Outgoing radiance of the fronts and backs (m, 3) of facets or leaves, linear RGB, as a pixel shows it.
-
-        The camera is for the gloss.
-        """
+        """Radiance (m, 3) of fronts and backs of facets or leaves as a pixel shows it; the camera is for the gloss."""
         front, back = np.zeros((2, len(surfaces), 3), np.float32)
         for part in blocks(len(surfaces), BATCH):
             batch = surfaces.take(part)
@@ -186,9 +179,9 @@ class Illumination:
         count = len(self.clouds)
         points, cells, sheets, keys = self.sheets.samples(self.clouds)
         bright = scattering.irradiance(self._world.parts.sum(axis=0)[None], np.array([[0.0, 0.0, 1.0]]))[0]
-        for lit in self.lamps:
-            if lit.light.kind == "SUN":
-                bright += lit.light.color * max(-lit.light.direction[2], 0.0)
+        for lamp, _ in self.lamps:
+            if lamp.kind == "SUN":
+                bright += lamp.color * max(-lamp.direction[2], 0.0)
         self._ground = np.asarray(ground, np.float64) * bright / np.pi
         if not count:
             return
@@ -313,7 +306,7 @@ def _shadow_steps(
     lamps, split, occluders = [], split_areas(tuple(sources.lights)), sources.occluders
     for number, light in enumerate(split):
         buffers = buffers_of(light, clouds, sheets, occluders, resolution, near) if light.shadow else []
-        lamps.append(LampBuffers(light, buffers))
+        lamps.append((light, buffers))
         yield 0.3 * (number + 1) / len(split)
     fewer, number = sheets.thinned(SKY_SHEETS)
     # Between sheets there are gaps that coarse pixels do not see.

@@ -38,11 +38,8 @@ def _directions() -> Floats:
     points = []
     for order in permutations(range(3)):
         odd = sum(order[i] > order[j] for i, j in ((0, 1), (0, 2), (1, 2))) % 2
-        points += [
-            [sign[i] * _SNUB[order[i]] for i in range(3)]
-            for sign in product((1.0, -1.0), repeat=3)
-            if sign.count(1.0) % 2 == odd
-        ]
+        signs = (sign for sign in product((1.0, -1.0), repeat=3) if sign.count(1.0) % 2 == odd)
+        points += [[sign[i] * _SNUB[order[i]] for i in range(3)] for sign in signs]
     return np.array(points)
 
 
@@ -55,27 +52,14 @@ SOLID_ANGLE = 4.0 * np.pi / len(DIRECTIONS)
 def harmonics(directions: Floats) -> Floats:
     """Real spherical harmonics up to the second band (..., 9) of unit vectors (..., 3)."""
     x, y, z = np.moveaxis(np.asarray(directions, np.float64), -1, 0)
-    return np.stack(
-        [
-            np.full_like(x, 0.28209479177387814),
-            0.4886025119029199 * y,
-            0.4886025119029199 * z,
-            0.4886025119029199 * x,
-            1.0925484305920792 * x * y,
-            1.0925484305920792 * y * z,
-            0.31539156525252005 * (3.0 * z * z - 1.0),
-            1.0925484305920792 * x * z,
-            0.5462742152960396 * (x * x - y * y),
-        ],
-        axis=-1,
-    )
+    linear = (0.4886025119029199 * axis for axis in (y, z, x))
+    xy, yz, xz = (1.0925484305920792 * a * b for a, b in ((x, y), (y, z), (x, z)))
+    zz, xx_yy = 0.31539156525252005 * (3.0 * z * z - 1.0), 0.5462742152960396 * (x * x - y * y)
+    return np.stack([np.full_like(x, 0.28209479177387814), *linear, xy, yz, zz, xz, xx_yy], axis=-1)
 
 
 def irradiance(light: Floats, normals: Floats) -> Floats:
-    """Irradiance (..., 3) of surfaces with unit normals (..., 3), W/m², not below 0.
-
-    ``light`` (..., 9, 3) is the radiance from all sides by harmonic and color.
-    """
+    """Irradiance (..., 3), W/m², of surfaces with unit normals (..., 3), by radiance (..., 9, 3) in harmonics."""
     return np.maximum(np.einsum("...k,...kc->...c", harmonics(normals) * _COSINE, light), 0.0)
 
 
@@ -85,10 +69,7 @@ def fluence(light: Floats) -> Floats:
 
 
 def scattered_fractions(color: Floats, transmission: Floats, dull: Floats | float = 0.0) -> Fractions:
-    """Fractions of light that sheets reflect (n, 3) and transmit (n, 3) diffusely, and that they mirror (n,).
-
-    ``dull`` (n,) is the part of the gloss of leaves that these hide from each other.
-    """
+    """Fractions that sheets reflect and transmit diffusely (n, 3), and mirror (n,); ``dull`` (n,) of gloss is lost."""
     through = transmission[:, None]
     gloss = np.where(transmission > 0.0, GLOSS * (1.0 - dull), 0.0)
     rest = (1.0 - gloss)[:, None]

@@ -97,10 +97,7 @@ class Sheet:
 
 
 def light_on(sheet: Sheet, canopy: Canopy) -> Generator[float, None, Floats]:
-    """Fraction of the light of the sky that reaches each cell of the ground, (rows · columns,) from 0 to 1.
-
-    Yields the fraction of the work that is done. The ground is taken to be level around each plant.
-    """
+    """Fraction (rows · columns,) of the sky's light on cells of ground, level at each plant; yields the work done."""
     canopy = canopy.ordered()
     half = np.maximum((canopy.top - canopy.base) / 2.0, 1e-3)
     wide = np.maximum(canopy.radius, 1e-3)
@@ -130,10 +127,7 @@ def light_on(sheet: Sheet, canopy: Canopy) -> Generator[float, None, Floats]:
 
 
 def fallen_on(sheet: Sheet, canopy: Canopy, kinds: int) -> Generator[float, None, Floats]:
-    """Leaf area (kinds, rows · columns) that falls on each cell from the plants of each species, m² on a square meter.
-
-    Yields the fraction of the work that is done.
-    """
+    """Leaf area (kinds, rows · columns) that falls on cells by species, m² on a square meter; yields the work done."""
     canopy = canopy.ordered()
     out = np.zeros((kinds, sheet.rows * sheet.columns))
     reach = _BESIDE * canopy.radius + _DRIFT * (canopy.base + canopy.top) / 2.0

@@ -200,12 +200,11 @@ def place(
         for species in company.order(np.flatnonzero(weights > 0.0).tolist()):
             sowing.sow(child_key(key, _SPECIES + species), species, _part(weights, species, rules))
     position, up, keys, species = sowing.result()
-    reason = sowing.reason(len(position))
     if company.rules:
         stay = ~company.lonely(position[:, :2], species, keys, Company(rules, older, older_species))
         sowing.refused["companions"] += int((~stay).sum())
         position, up, keys, species = position[stay], up[stay], keys[stay], species[stay]
-        reason = sowing.reason(len(position))
+    reason = sowing.reason(len(position))
     azimuth, scale = 2.0 * np.pi * uniform(keys, SiteDraw.AZIMUTH), _scales(position[:, 2], keys, site, rules)
     up = _tilted(up, rules.tilt)
     return Placement(position, azimuth, scale, species, _positive(keys), sowing.wanted, reason, up)

@@ -36,9 +36,7 @@ class Companion:
         "Attraction",
         "-1: never within the distance of the companion; 0: indifferent; 1: only within it. Strong values leave room "
         "for fewer plants",
-        subtype='FACTOR',
-        min=-1.0,
-        max=1.0,
+        **FACTOR | {"min": -1.0},
     )
     #: Meters on the map.
     distance: float = setting(
@@ -125,9 +123,7 @@ class Rules(GroundLimits):
         pi,
         "Facing Spread",
         "Maximum angle between that direction and the one a slope faces; 180° allows any",
-        min=0.0,
-        max=pi,
-        **_ANGLE,
+        **_SLOPE | {"max": pi},
     )
     edge_falloff: float = setting(
         0.0, "Edge Falloff", "Distance from the border within which plants thin out; 0 for none", **meters(0.0, 100.0)

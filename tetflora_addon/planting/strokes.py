@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from ..arrays import Floats, Integers, Keys, Mask
 from ..growth.hashing import child_key, key_of_seed, uniform
-from ..parameters import meters, setting
+from ..parameters import FACTOR, meters, setting
 from .plane import NO_DISTANCE, Spacing, cells_of, packed
 from .rules import species_by_weight
 
@@ -47,9 +47,7 @@ class Brush:
         1.0,
         "Strength",
         "Fraction of missing or surplus plants that one dab adds or removes; lower pen pressure reduces it",
-        subtype='FACTOR',
-        min=0.01,
-        max=1.0,
+        **FACTOR | {"min": 0.01},
     )
     min_distance: float = setting(
         0.0,

@@ -39,10 +39,7 @@ class HeightGrid:
     height: Floats
 
     def at(self, values: Floats, points: Floats) -> Floats:
-        """Values (h, w) of cells at places on the map (n, 2 or more), linear between middles, (n,).
-
-        Cells of NaN do not count; NaN comes back where all four around a place are.
-        """
+        """Values (h, w) of cells at places (n, 2 or more), linear between middles, (n,); NaN where all four are NaN."""
         rows, columns = values.shape
         place = (points[:, :2] - (self.west, self.south)) / self.cell - 0.5
         low = np.floor(place)
@@ -201,10 +198,8 @@ def _sweep(water: Floats, ground: Floats, lines: range, before: int, cell: float
 def _catchment(surface: Floats, cell: float) -> Floats:
     """Area that is uphill of each cell of a surface (h, w), with its own, (h, w) in m²; NaN where there is no ground.
 
-    Cells without a lower neighbor are outlets. All of the area arrives at these.
-
-    A cell is done when all that flow into it are: as many rounds as the longest way of water has cells, each with only
-    the cells that it finishes. What arrives is summed in the order of neighbors, so the result is the same anywhere.
+    All of it arrives at cells without a lower neighbor. A cell is done when all that flow into it are. What arrives is
+    summed in the order of neighbors, so the result is the same anywhere.
     """
     rows, columns = surface.shape
     wide = columns + 2
@@ -249,11 +244,8 @@ def steepness(surface: Floats, cell: float) -> Floats:
 
 
 def topographic_index(height: Floats, cell: float) -> Floats:
-    """ln(a / tan β) of each cell, (h, w), a the area uphill for each meter of width; NaN where there is no ground.
-
-    The larger of two: hollows keep what runs into them, and hollows are full and flow over.
-    """
-    surfaces = height, _filled(height, cell)
+    """ln(a / tan β) of each cell, (h, w), a the area uphill for each meter of width; NaN where there is no ground."""
+    surfaces = height, _filled(height, cell)  # hollows keep what runs into them, or are full and flow over
     return np.log(np.maximum(*(_catchment(s, cell) / cell / np.maximum(steepness(s, cell), _LEVEL) for s in surfaces)))
 
 

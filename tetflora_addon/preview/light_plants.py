@@ -48,15 +48,9 @@ _LOWER, _UPPER, _FOOT = (slice(first, first + SIDES) for first in (1, 1 + SIDES,
 _CROWN = slice(_FOOT.start)
 _HEIGHTS = np.array([0.0, *np.repeat(_RINGS, SIDES), 1.0])  # of those of the crown, as fractions of its height
 #: Directions out of a plant at its corners; the middle of the trunk is in the shade.
-_NORMALS = np.concatenate(
-    [
-        [[0.0, 0.0, -1.0]],
-        *((_AROUND + [0.0, 0.0, up]) / np.hypot(1.0, up) for up in (-0.1, 0.5)),
-        [[0.0, 0.0, 1.0]],
-        _AROUND,
-        [[0.0, 0.0, 0.0]],
-    ]
-).astype(np.float32)
+_OUTWARD = [(_AROUND + [0.0, 0.0, up]) / np.hypot(1.0, up) for up in (-0.1, 0.5)]
+_AXIAL = np.array([[[0.0, 0.0, up]] for up in (-1.0, 1.0, 0.0)])
+_NORMALS = np.concatenate([_AXIAL[0], *_OUTWARD, _AXIAL[1], _AROUND, _AXIAL[2]]).astype(np.float32)
 
 
 @dataclass(frozen=True)
@@ -158,13 +152,8 @@ def crowns_of(flora: Flora, seeds: Seeds) -> Shapes:
     if lies.any():
         lying = np.flatnonzero(lies[seeds.species])
         axes[lying] = trunks(rows, seeds.take(lying)).frame[:, :, 2]
-    crowns = CrownPoints(
-        (seeds.position - origin).astype(np.float32),
-        axes,
-        forms.astype(np.float32, copy=False),
-        seeds.species,
-        _looks_of_kinds(flora, seeds),
-    )
+    place, looks = (seeds.position - origin).astype(np.float32), _looks_of_kinds(flora, seeds)
+    crowns = CrownPoints(place, axes, forms.astype(np.float32, copy=False), seeds.species, looks)
     nothing = np.zeros((0, 3))
     return Shapes(nothing.astype(np.float32), nothing, nothing.astype(np.int32), len(seeds), len(seeds), origin, crowns)
 
@@ -182,10 +171,7 @@ def _looks_of_kinds(flora: Flora, seeds: Seeds) -> Floats32:
 
 
 def nearest(shapes: Shapes, eye: Floats, most: int = MOST_FACES) -> tuple[Shapes, float]:
-    """Those plants as crowns and trunks with faces that look largest from a place (3,) in the world.
-
-    Also the height over the distance of the least of them: all that look larger have faces.
-    """
+    """Plants that look largest from a place (3,) in the world, with faces; the height over distance of the least."""
     crowns = shapes.crowns
     away = crowns.positions - (eye - shapes.origin).astype(np.float32)
     size = crowns.forms[:, 1] ** 2 / np.maximum(np.einsum("ni,ni->n", away, away), 1e-6)
@@ -204,8 +190,7 @@ def with_faces(shapes: Shapes, points: Integers | slice = slice(None)) -> Shapes
     shown = np.column_stack([forms[:, :2], looks[:, 3:4] * forms[:, 2:]])
     foot, leaves, wood = _THIN * forms[:, 1], looks[:, :3], looks[:, 4:]
     positions, colors = _crowns(crowns.positions[points], frame, shown, foot, leaves, wood)
-    indices = _repeated(_faces(), len(_NORMALS), len(up))
-    return Shapes(positions, colors, indices, len(up), shapes.of, shapes.origin)
+    return Shapes(positions, colors, _repeated(_faces(), len(_NORMALS), len(up)), len(up), shapes.of, shapes.origin)
 
 
 def bounds_of_plants(flora: Flora, seeds: Seeds, most: int = MOST_PLANTS) -> Shapes:
@@ -354,22 +339,16 @@ def joined(parts: Sequence[Shapes]) -> Shapes:
     crowns = None
     if points:
         kinds = np.cumsum([0, *(len(part.crowns.looks) for part in points)]).tolist()
-        crowns = CrownPoints(
-            np.concatenate([part.crowns.positions + (part.origin - origin).astype(np.float32) for part in points]),
-            np.concatenate([part.crowns.axes for part in points]),
-            np.concatenate([part.crowns.forms for part in points]),
-            np.concatenate([part.crowns.kinds + np.int32(n) for part, n in zip(points, kinds, strict=False)]),
-            np.concatenate([part.crowns.looks for part in points]),
-        )
-    return Shapes(
-        np.concatenate([(part.positions + (part.origin - origin)).astype(np.float32) for part in parts]),
-        np.concatenate([part.colors for part in parts]),
-        np.concatenate([part.indices + np.int32(first) for part, first in zip(parts, firsts, strict=False)]),
-        sum(part.plants for part in parts),
-        sum(part.of for part in parts),
-        origin,
-        crowns,
-    )
+        places = [part.crowns.positions + (part.origin - origin).astype(np.float32) for part in points]
+        numbers = [part.crowns.kinds + np.int32(n) for part, n in zip(points, kinds, strict=False)]
+        names = ("axes", "forms", "looks")
+        axes, forms, looks = (np.concatenate([getattr(part.crowns, name) for part in points]) for name in names)
+        crowns = CrownPoints(np.concatenate(places), axes, forms, np.concatenate(numbers), looks)
+    positions = np.concatenate([(part.positions + (part.origin - origin)).astype(np.float32) for part in parts])
+    indices = [part.indices + np.int32(first) for part, first in zip(parts, firsts, strict=False)]
+    colors = np.concatenate([part.colors for part in parts])
+    counts = sum(part.plants for part in parts), sum(part.of for part in parts)
+    return Shapes(positions, colors, np.concatenate(indices), *counts, origin, crowns)
 
 
 def _box(radius: float, base: float, top: float) -> tuple[Floats, Integers]:

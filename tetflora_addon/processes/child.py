@@ -58,10 +58,7 @@ def peak() -> int:
 
 
 class _Clock:
-    """Gives memory back when there is a pause, and ends the process when it has waited for too long.
-
-    Memory that the system has taken back has to be cleared before it is used again.
-    """
+    """Gives memory back, which takes time to get again, when there is a pause; ends the process after a longer one."""
 
     def __init__(self, give_back: Callable[[], None]) -> None:
         self.since = time.monotonic()

@@ -152,8 +152,7 @@ def _known(flora: Flora, number: int) -> Floats | None:
     if table is not None:
         return table.astype(np.float64)
     if name not in _found:
-        rows = int((flora.rows["species"] == number).sum())
-        stored = cached(_KIND, name, (2, rows, len(COUNTS)), lambda: None)
+        stored = cached(_KIND, name, (2, int((flora.rows["species"] == number).sum()), len(COUNTS)), lambda: None)
         if stored is None:
             return None
         _found[name] = stored

@@ -85,10 +85,7 @@ def _balance(chord: Floats, extinction: Floats, leaf: Floats, facet: Floats) -> 
 
 
 def balanced_colors(color: Floats, hotspot_factor: Floats) -> Floats:
-    """Colors (n, 3) with which light that is scattered once changes by factors (n,).
-
-    Of all light that a crown of albedo ω sends back, 1 − pω was scattered once.
-    """
+    """Colors (n, 3) with which light scattered once, 1 − pω of all for an albedo ω, changes by factors (n,)."""
     single = 1.0 - _RECOLLISION * np.clip(color, 0.0, 1.0)
     return np.clip(color * hotspot_factor[:, None] ** single**_POWER, 0.0, 1.0)
 

@@ -131,10 +131,7 @@ def subplant_facets(flora: Flora, subplants: Branches, rules: FacetRules) -> Fac
 
 
 def piece_facets(flora: Flora, pieces: Pieces, rules: FacetRules, whole: Bearers | None = None) -> Facets:
-    """Facets of pieces (n) of branches, by rules of n.
-
-    Where whole branches are given, and that (n,) of each piece, their wood is drawn as it is.
-    """
+    """Facets of pieces (n) of branches, by rules of n; of leaves alone where whole branches are given, and drawn."""
     leaves = _leaves_of_pieces(flora, pieces, rules, whole)
     return leaves if whole is not None else Facets.concatenate([leaves, _wood_of_pieces(flora, pieces, rules)])
 
@@ -407,10 +404,7 @@ def asset_weights(placed: PlacedAssets, parts: AssetParts, number: Floats) -> Fl
 def facets_of_assets(
     placed: PlacedAssets, parts: AssetParts, totals: Totals, leaf: Floats, wood: Floats, left_out: Floats | None = None
 ) -> Facets:
-    """Facets of clusters (n,) with `facet_totals`, of sides for leaves and for wood (n,), meters.
-
-    A fraction (n,) of them is left out.
-    """
+    """Facets of clusters (n,) with `facet_totals`, of sides for leaves and wood (n,), meters, less a part (n,)."""
     weight = asset_weights(placed, parts, totals.optical_area / np.maximum(leaf, 1e-12) ** 2)
     key, facets = placed.keys(parts), []
     for leafy, area, side in ((True, totals.leaf_area, leaf), (False, totals.wood_area / 2, wood)):

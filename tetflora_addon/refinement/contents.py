@@ -62,12 +62,8 @@ class Totals(Arrays):
 
 def subplant_totals(flora: Flora, subplants: Branches) -> Totals:
     """Compiled means for sub-plants."""
-    return Totals(
-        flora.leaf_areas(subplants),
-        flora.wood_areas(subplants),
-        flora.face_counts(subplants),
-        feature_width(flora, subplants),
-    )
+    areas = flora.leaf_areas(subplants), flora.wood_areas(subplants)
+    return Totals(*areas, flora.face_counts(subplants), feature_width(flora, subplants))
 
 
 def feature_width(flora: Flora, subplants: Branches) -> Floats:
@@ -124,12 +120,8 @@ def sums(totals: Totals, cells: Integers, number: int) -> Totals:
     total = np.bincount(cells, area, number)
     width = np.bincount(cells, area * width, number) / np.where(total > 0, total, 1)
     only_large = (total == 0) & (np.bincount(cells[large], minlength=number) > 0)
-    return Totals(
-        np.bincount(cells, totals.leaf_area, number),
-        np.bincount(cells, totals.wood_area, number),
-        np.bincount(cells, totals.polygons, number),
-        np.where(only_large, np.inf, width),
-    )
+    added = (np.bincount(cells, of, number) for of in (totals.leaf_area, totals.wood_area, totals.polygons))
+    return Totals(*added, np.where(only_large, np.inf, width))
 
 
 @dataclass(frozen=True)
@@ -194,10 +186,11 @@ class Contents:
     polygons: InCells[Polygons] = field(default_factory=lambda: InCells.none(Polygons))
 
 
-def in_the_root(polygons: Polygons, large: Mask | bool = False) -> InCells[Polygons]:
-    """Polygons (n,), all in the root; ``large`` ones (n,) stay polygons whatever is decided about their cells."""
+def in_the_root(polygons: Polygons, camera: Camera | None = None) -> InCells[Polygons]:
+    """Polygons (n,), all in the root; those that are large for a camera stay polygons whatever is decided on cells."""
     totals = polygon_totals(polygons)
-    totals = replace(totals, width=np.where(large, np.inf, totals.width))
+    if camera is not None:
+        totals = replace(totals, width=np.where(_large_polygons(polygons, camera), np.inf, totals.width))
     return InCells(polygons, np.zeros(len(polygons), np.int32), totals)
 
 
@@ -226,7 +219,7 @@ class PolygonsByCell(Chunks[InCells[Polygons]]):
         return out
 
 
-def large_polygons(polygons: Polygons, camera: Camera) -> Mask:
+def _large_polygons(polygons: Polygons, camera: Camera) -> Mask:
     """Polygons (n,) too large for a facet; leaves never are, since one facet may stand for several."""
     meshes, face = polygons.meshes, polygons.face
     optical = polygons.areas() * np.where(meshes.solid[face], 0.5, 1.0)
@@ -284,16 +277,10 @@ def _cut(polygons: Polygons, planes: Floats, slack: Floats | float = 0.0) -> tup
     turn = (alone[:, None] + np.arange(3)) % 3
     w = np.take_along_axis(whole.weights[crossing], turn[:, :, None], axis=1)
     d = np.take_along_axis(distance[crossing], turn, axis=1)
-    first, second = (
-        w[:, 0] + (w[:, k] - w[:, 0]) * np.clip(d[:, :1] / (d[:, :1] - d[:, k : k + 1]), 0.0, 1.0) for k in (1, 2)
-    )
-    weights = np.concatenate(
-        [
-            np.stack([w[:, 0], first, second], axis=1),
-            np.stack([first, w[:, 1], w[:, 2]], axis=1),
-            np.stack([first, w[:, 2], second], axis=1),
-        ]
-    )
+    places = (np.clip(d[:, :1] / (d[:, :1] - d[:, k : k + 1]), 0.0, 1.0) for k in (1, 2))
+    first, second = (w[:, 0] + (w[:, k] - w[:, 0]) * place for k, place in enumerate(places, 1))
+    fragments = (w[:, 0], first, second), (first, w[:, 1], w[:, 2]), (first, w[:, 2], second)
+    weights = np.concatenate([np.stack(corners, axis=1) for corners in fragments])
     sides = (d[:, 0] >= 0).astype(np.int64)
     from_, side = np.tile(crossing, 3), np.concatenate([sides, 1 - sides, 1 - sides])
     kept = np.flatnonzero(area_fractions(weights) > 0)  # a cut through a corner leaves pieces of no size

@@ -131,10 +131,7 @@ def contributions(cells: Terminals, transmittance: Floats) -> Floats:
 
 
 def gains_nothing(splitting: Mask, cells: Terminals, transmittance: Floats, camera: Camera) -> bool:
-    """Whether dividing the last few cells, a mask (n,), would change almost no pixels, and they hold few polygons.
-
-    ``transmittance`` (n,) is the fraction of each that nothing in front blocks.
-    """
+    """Whether dividing some cells, a mask (n,), changes few pixels, by transmittance (n,), and few polygons."""
     if splitting.sum() > FEW * len(cells):
         return False
     gain = contributions(cells, transmittance)[splitting].sum() / (camera.width * camera.height)

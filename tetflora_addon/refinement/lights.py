@@ -223,10 +223,7 @@ def shadows_of(
 
 
 def seen_ground(camera: Camera, occluders: Floats | None, height: float) -> Floats:
-    """Points (m, 3) where rays through the image meet occluders, triangles (t, 3, 3), or else level ground at a height.
-
-    All in meters, world space.
-    """
+    """Places (m, 3) where rays through the image meet occluders (t, 3, 3), or else level ground at a height; meters."""
     views = face_cameras(camera, GROUND // 2) if camera.kind == "PANO" else [camera]
     points = []
     for view in views:

@@ -10,7 +10,7 @@ anything of the size of the others, and with that what the settings allow. Outli
 """
 
 import time
-from collections.abc import Generator, Sequence
+from collections.abc import Callable, Generator, Sequence
 from dataclasses import asdict, dataclass, field, replace
 
 import numpy as np
@@ -25,18 +25,7 @@ from ..growth.seeds import Branches, Seeds
 from ..tetrahedra.geometry import squared_edges
 from ..tetrahedra.roots import view_root, world_root
 from ..tetrahedra.tree import TetrahedralTree
-from .contents import (
-    Contents,
-    PlantParts,
-    PolygonsByCell,
-    Slack,
-    Totals,
-    bounding_box,
-    in_the_root,
-    large_polygons,
-    sort_into_children,
-    sums,
-)
+from .contents import Contents, PlantParts, PolygonsByCell, Totals, bounding_box, in_the_root, sort_into_children, sums
 from .decisions import Decision, Terminals, decide, gains_nothing, without_splits
 from .lights import Light, decide_by_shadows, seen_ground, shadows_of
 from .polygons import Polygons
@@ -325,7 +314,7 @@ def refine(
     settings = replace(settings, visibility_resolution=min(settings.visibility_resolution, pixels))
     camera = widened_for(camera, settings.margin, flora, plants.parts.branches, polygons, assets.parts)
     slack = _slack(camera, settings.visibility_resolution)
-    held = in_the_root(polygons, large_polygons(polygons, camera))
+    held = in_the_root(polygons, camera)
     bounds = _bounds(flora, plants, assets, polygons)
     tree = world_root(bounds, camera.origin) if is_anchored(camera, settings) else view_root(camera, bounds)
     cell_polygons, most = PolygonsByCell(sort_into_children(tree, held, slack)), MOST_FRAGMENTS + 2 * len(held)
@@ -384,10 +373,8 @@ def refine(
         dividing, edge = np.zeros(len(tree), bool), np.zeros(len(tree))
         dividing[parents] = True
         edge[parents] = np.sqrt(squared_edges(tree.vertices(parents)).max(axis=1))
-        may_cut = len(cell_polygons) <= most
-        new = sort_into_children(
-            tree, cell_polygons.take_within(dividing), slack if may_cut else lambda points: np.full(len(points), np.inf)
-        )
+        loose = slack if len(cell_polygons) <= most else lambda points: np.full(len(points), np.inf)
+        new = sort_into_children(tree, cell_polygons.take_within(dividing), loose)
         cell_polygons.append(new)
         changed = plants.update(tree, dividing, edge) | assets.update(tree, dividing, edge)
         changed[new.cell] = True
@@ -427,7 +414,7 @@ def _drawn(
     return Terminals.concatenate([cells, Terminals.seen(tree, nodes, totals, buffers.camera, buffer)]), buffer
 
 
-def _slack(camera: Camera, resolution: int) -> Slack:
+def _slack(camera: Camera, resolution: int) -> Callable[[Floats], Floats]:
     """A pixel of the alpha buffer, in meters: nothing smaller changes decisions."""
     pixels = max(pixels_of_buffer(camera, resolution), SLACK)
     return lambda points: pixels * camera.extent_around(points)
@@ -444,10 +431,7 @@ def _on_day(settings: RefinementSettings, flora: Flora, plants: Branches) -> Ref
 def _split(
     tree: TetrahedralTree, nodes: NDArray, fraction: NDArray, camera: Camera, settings: RefinementSettings, deepest: int
 ) -> None:
-    """Divide nodes: large ones into eight as suits their shape, others in two as often as it pays.
-
-    A node is bisected again as long as its pixels, seen as well as its ancestor, exceed the cutoff.
-    """
+    """Divide large nodes into eight as suits their shape, others in two as long as their pixels exceed the cutoff."""
     pixels, _ = expected_pixels(tree.vertices(nodes), camera)
     # An eighth has a quarter of the pixels: where that is above the cutoff, all eight would be made anyway.
     large = (pixels * fraction > 4.0 * settings.cutoff**2) & (tree.level[nodes] + GENERATIONS <= deepest)
@@ -470,16 +454,13 @@ def _split(
 
 def step_of(state: Refinement) -> Step:
     """Figures of a state, valid only before the loop goes on."""
-    numbers = np.bincount(state.decision, minlength=len(Decision))
+    numbers = np.bincount(state.decision, minlength=len(Decision)).tolist()
     explicit = state.decision == Decision.EXPLICIT
     subplants, branches = state.plants.numbers
     return Step(
         tetrahedra_made=int(state.tree.tetrahedra_made),
         levels=int(state.tree.levels),
-        split=int(numbers[Decision.SPLIT]),
-        proxy=int(numbers[Decision.PROXY]),
-        hidden=int(numbers[Decision.HIDDEN]),
-        explicit=int(numbers[Decision.EXPLICIT]),
+        **{one.name.lower(): numbers[one] for one in Decision if one != Decision.EMPTY},
         subplants=subplants,
         pieces=branches,
         polygons=round(float(state.totals.polygons[explicit].sum())),

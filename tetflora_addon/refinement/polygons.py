@@ -198,8 +198,7 @@ class Polygons(Arrays):
         corners = weights @ meshes.corners(triangle, instance)
         center = corners.mean(axis=1)
         reach = np.linalg.norm(corners - center[:, None], axis=2).max(axis=1, initial=0.0)
-        part = np.arange(len(face), dtype=np.int32)
-        numbers = (np.asarray(a, np.int32) for a in (face, instance, part, triangle))
+        numbers = (np.asarray(a, np.int32) for a in (face, instance, np.arange(len(face)), triangle))
         return cls(meshes, *numbers, weights, center, reach)
 
     def take(self, index: NDArray | slice) -> Self:

@@ -22,10 +22,8 @@ class RefinementSettings:
         "Tetrahedra smaller than this many pixels are not split further. Smaller values give finer results and take "
         "longer; 1 to 4 pixels are hard to tell apart",
         subtype='PIXEL',
-        min=0.25,
         soft_min=0.5,
-        soft_max=16.0,
-        max=1000.0,
+        **within(0.25, 16.0, 1000.0),
     )
     #: Leaves narrower than so many pixels become facets; up to 2.5 times this width, a growing fraction stays real.
     #: About half of ``facet``: below that, leaves cost more polygons than facets.

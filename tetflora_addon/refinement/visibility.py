@@ -117,13 +117,11 @@ class AlphaBuffer:
         # What lies behind an occluder is neither seen nor hides anything.
         open_ones = slice(None) if self.end is None else np.flatnonzero(fraction)
         self._changed[pixel[open_ones]] = True
+        hides = fragments.entry >= self.camera.min_occluding_depth
         for name, values in (
             ("_cell", np.asarray(cells, np.int32)[cell]),
             ("_pixel", pixel),
-            (
-                "_depth",
-                optical * np.minimum(coverage * fraction, 1.0) * (fragments.entry >= self.camera.min_occluding_depth),
-            ),
+            ("_depth", optical * np.minimum(coverage * fraction, 1.0) * hides),
             ("_fraction", counted * fraction / np.maximum(weight, 1e-300)[cell]),
             ("_before", np.ones(len(cell))),
         ):
