@@ -147,25 +147,14 @@ def _forest_part(depsgraph: Depsgraph, source: Source, variant: Integers32, scal
     origin = matrix[:3, 3] if whole else origin_near(seeds.position)
     if not whole:
         matrix[:3, 3] = origin
-    position = (seeds.position - origin).astype(np.float32)
-    rotation = quaternions(seeds.frame).astype(np.float32)
-    heights = np.array([one.height for one in shown.variants])[variant] * scale
-    return ForestPart(
-        name,
-        tuple((species_of(kind), getattr(skeleton_object_of(kind), "name_full", "")) for kind in seeds.identifiers),
-        origin,
-        position,
-        rotation,
-        scale.astype(np.float32),
-        variant,
-        seeds.species.astype(np.int32),
-        seeds.seed,
-        np.zeros(len(seeds), np.float32) if ages is None else ages.astype(np.float32),
-        heights.astype(np.float32),
-        stored if whole else _points(position, rotation, seeds, ages, sizes),
-        matrix,
-        _settings(obj, matrix) if whole else {},
-    )
+    kinds = [(species_of(kind), getattr(skeleton_object_of(kind), "name_full", "")) for kind in seeds.identifiers]
+    place = (seeds.position - origin).astype(np.float32), quaternions(seeds.frame).astype(np.float32)
+    identity = variant, seeds.species.astype(np.int32), seeds.seed
+    years = np.zeros(len(seeds), np.float32) if ages is None else ages.astype(np.float32)
+    heights = (np.array([one.height for one in shown.variants])[variant] * scale).astype(np.float32)
+    of_field = (stored, matrix, _settings(obj, matrix)) if whole else (_points(*place, seeds, ages, sizes), matrix, {})
+    columns = *place, scale.astype(np.float32), *identity, years, heights
+    return ForestPart(name, tuple(kinds), origin, *columns, *of_field)
 
 
 def _settings(field: Object, matrix: Floats) -> dict[str, float | int | str | list[float]]:

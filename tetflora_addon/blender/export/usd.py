@@ -107,12 +107,8 @@ def _write_part(pxr: SimpleNamespace, stage: object, path: str, part: ForestPart
     instancer.CreateOrientationsAttr(_array(pxr, "Quath", part.rotation.astype(np.float16)))
     instancer.CreateScalesAttr(_array(pxr, "Vec3f", np.repeat(part.scale[:, None], 3, axis=1)))
     primvars = pxr.UsdGeom.PrimvarsAPI(instancer)
-    columns = {
-        "species": ('INT', part.species),
-        "seed": stored_seeds(part.seed),
-        "age": ('FLOAT', part.age),
-        "height": ('FLOAT', part.height),
-    }
+    columns = {"species": ('INT', part.species), "seed": stored_seeds(part.seed)}
+    columns |= {"age": ('FLOAT', part.age), "height": ('FLOAT', part.height)}
     for name, (kind, values) in columns.items():
         _add(pxr, primvars, name, kind, values)
     known = {"position": ('FLOAT_VECTOR', part.position), **{name: columns[name] for name in ("seed", "species")}}
@@ -123,21 +119,11 @@ def _write_part(pxr: SimpleNamespace, stage: object, path: str, part: ForestPart
         stored[name] = kind if same else f"{kind} {PREFIX}{name}"
         if not same:
             _add(pxr, primvars, PREFIX + name, kind, values)
-    instancer.GetPrim().SetCustomDataByKey(
-        KEY,
-        {
-            "format": FORMAT,
-            "name": part.name,
-            "species": pxr.Vt.StringArray([species for species, _ in part.kinds]),
-            "forms": pxr.Vt.StringArray([form for _, form in part.kinds]),
-            "attributes": stored,
-            "matrix": pxr.Gf.Matrix4d(np.asarray(part.matrix, np.float64).T.tolist()),
-            "object": {
-                key: pxr.Vt.DoubleArray(value) if isinstance(value, list) else value
-                for key, value in part.settings.items()
-            },
-        },
-    )
+    species, forms = (pxr.Vt.StringArray([kind[i] for kind in part.kinds]) for i in (0, 1))
+    told = {"format": FORMAT, "name": part.name, "species": species, "forms": forms, "attributes": stored}
+    told["matrix"] = pxr.Gf.Matrix4d(np.asarray(part.matrix, np.float64).T.tolist())
+    lists = {key: pxr.Vt.DoubleArray(value) for key, value in part.settings.items() if isinstance(value, list)}
+    instancer.GetPrim().SetCustomDataByKey(KEY, {**told, "object": part.settings | lists})
 
 
 def stored_seeds(seed: Integers) -> tuple[str, NDArray[np.int32]]:
@@ -241,12 +227,9 @@ def _add_texture(pxr: SimpleNamespace, stage: object, path: str, name: str, file
     image.CreateInput("wrapT", types.Token).Set("repeat")
     image.CreateInput("sourceColorSpace", types.Token).Set("sRGB" if name == "color" else "raw")
     image.CreateInput("st", types.Float2).ConnectToSource(place.ConnectableAPI(), "result")
-    key, output, of = {
-        "color": ("diffuseColor", "rgb", types.Color3f),
-        "roughness": ("roughness", "r", types.Float),
-        "opacity": ("opacity", "r", types.Float),
-        "normal": ("normal", "rgb", types.Normal3f),
-    }[name]
+    colored = {"color": ("diffuseColor", types.Color3f), "normal": ("normal", types.Normal3f)}
+    key, of = colored.get(name, (name, types.Float))
+    output = "rgb" if name in colored else "r"
     if name == "normal":
         image.CreateInput("scale", types.Float4).Set(pxr.Gf.Vec4f(2.0, 2.0, 2.0, 1.0))
         image.CreateInput("bias", types.Float4).Set(pxr.Gf.Vec4f(-1.0, -1.0, -1.0, 0.0))
@@ -330,7 +313,7 @@ def forest_steps(order: Import, mix: Mapping[str, float]) -> Steps:
     """
     yield Progress(0.0, f"Reading {order.path.name}")
     fields: list[bpy.types.Object] = []
-    whole, missing, number = False, [], 0
+    missing, number = [], 0
     try:
         for name, data, points in _read_parts(order.path):
             if data and int(data.get("format", 0)) > FORMAT:
@@ -345,12 +328,11 @@ def forest_steps(order: Import, mix: Mapping[str, float]) -> Steps:
             yield Progress(0.5, f"{number:,} plants")
         for field in fields:
             link_field(order.scene, field)
-        whole = True
-    finally:
-        if not whole:
-            meshes = [field.data for field in fields]
-            bpy.data.batch_remove(fields)
-            bpy.data.batch_remove(meshes)
+    except BaseException:  # an error, or Esc
+        meshes = [field.data for field in fields]
+        bpy.data.batch_remove(fields)
+        bpy.data.batch_remove(meshes)
+        raise
     told = [f"{number:,} plants imported", f"{len(fields):,} field{'s' * (len(fields) > 1)}"]
     if missing:
         told.append(f"without their forms, which this file has no objects for: {listed(sorted(set(missing)))}")

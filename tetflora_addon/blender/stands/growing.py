@@ -37,21 +37,14 @@ _FINEST, _MOST = 1.0, 500_000
 _LEVEL = 0.4  # wetness of ground that is neither ridge nor valley
 
 
-@dataclass(frozen=True)
-class Soil:
-    """Climate and soil as the settings say, see `properties.TetFloraStand`; ``slope_max`` in radians."""
+def _stand_site(
+    ground: Terrain, climate: tuple[float, float], steepest: float, moisture: float, relief: float, fertility: float
+) -> tuple[StandSite, Floats]:
+    """The site of a stand, on which plants can be, and the place (2,) that its coordinates are counted from.
 
-    degree_days: float
-    coldest_month: float
-    moisture: float
-    relief: float
-    fertility: float
-    slope_max: float
-
-
-def _stand_site(ground: Terrain, soil: Soil) -> tuple[StandSite, Floats]:
-    """The site of a stand, on which plants can be, and the place (2,) that its coordinates are counted from."""
-    grid, wetness = _grid(ground.triangles, soil.relief)
+    By settings of `TetFloraStand`: degree days and coldest month; the largest slope, radians; and the soil.
+    """
+    grid, wetness = _grid(ground.triangles, relief)
     land = np.isfinite(grid.height)
     if not land.any():
         raise SceneError(
@@ -61,18 +54,17 @@ def _stand_site(ground: Terrain, soil: Soil) -> tuple[StandSite, Floats]:
     height = _whole(grid.height)
     sides = enumerate(height.shape)
     rise = [np.gradient(height, grid.cell, axis=a) if n > 1 else np.zeros_like(height) for a, n in sides]
-    plantable = land & (np.hypot(*rise) <= np.tan(min(soil.slope_max, 1.57)))
+    plantable = land & (np.hypot(*rise) <= np.tan(min(steepest, 1.57)))
     if not plantable.any():
         raise SceneError(
-            f"All of the ground is steeper than Max Slope ({np.degrees(soil.slope_max):.0f}°); raise Max Slope or use "
+            f"All of the ground is steeper than Max Slope ({np.degrees(steepest):.0f}°); raise Max Slope or use "
             "another mesh"
         )
     plantable = plantable * _masks(ground, grid)
     if not plantable.any():
         raise SceneError("Vertex Group, Areas, Paths or the biome's limits leave no ground for the stand; change them")
-    moisture = np.full(height.shape, soil.moisture) + soil.relief * (wetness - _LEVEL)
-    fertility, climate = np.full(height.shape, soil.fertility), (soil.degree_days, soil.coldest_month)
-    site = StandSite(0.0, 0.0, grid.cell, height, plantable, moisture, fertility, *climate)
+    soil = np.full(height.shape, moisture) + relief * (wetness - _LEVEL), np.full(height.shape, fertility)
+    site = StandSite(0.0, 0.0, grid.cell, height, plantable, *soil, *climate)
     return site, np.array([grid.west, grid.south])
 
 
@@ -196,7 +188,7 @@ def new_stand_steps(
     # The field comes first, with the settings that its plants will grow by: those of the scene may change meanwhile.
     nothing = np.zeros((0, 3)), np.zeros((0, 4)), *np.zeros((1, 0)), *np.zeros((2, 0), np.int32), ()
     field = fields.write_field(name, *nothing)
-    mesh, complete = field.data, False
+    mesh = field.data
     try:
         stand = field.tetflora.stand
         if fill is None:
@@ -207,17 +199,17 @@ def new_stand_steps(
             stand.grounds.add().object = obj
         grown = yield from _again_steps(data, field, grounds)
         stand = field.tetflora.stand
-        stand.is_grown, complete = True, True
+        stand.is_grown = True
         field.tetflora.stand_year = float(stand.years)
         field.display_type = 'BOUNDS'  # its points are plants of all years
         link_field(scene, field)
         return grown
-    finally:
-        if not complete:
-            if is_there(field):
-                bpy.data.objects.remove(field)
-            if is_there(mesh) and not mesh.users:
-                bpy.data.meshes.remove(mesh)
+    except BaseException:  # an error, or Esc
+        if is_there(field):
+            bpy.data.objects.remove(field)
+        if is_there(mesh) and not mesh.users:
+            bpy.data.meshes.remove(mesh)
+        raise
 
 
 @job("Growing the stand")
@@ -242,12 +234,12 @@ def _again_steps(data: JobData, field: Object, grounds: list[Object]) -> Job[Gro
         raise SceneError(f'"{field.name}" has no species; add one to the list')
     members = [StandSpecies(species_for(scene, e.species), e.planted, e.incoming_seeds) for e in entries]
     names = [entry.species for entry in entries]
-    soil = Soil(**{name: getattr(stand, name) for name in Soil.__dataclass_fields__})
+    climate, soil = (stand.degree_days, stand.coldest_month), (stand.moisture, stand.relief, stand.fertility)
     settings = StandSettings(**{name: getattr(stand, name) for name in StandSettings.__dataclass_fields__})
     ground = read_ground(grounds, depsgraph, **{name: getattr(stand, name) for name in _MASKS})
     ground = zoned(depsgraph, stand, grounds, ground)
     stood_on = forms_of(grounds, lambda obj: ground_form(obj, depsgraph))
-    site, corner = yield from call_in_thread(progress, _stand_site, ground, soil)
+    site, corner = yield from call_in_thread(progress, _stand_site, ground, climate, stand.slope_max, *soil)
     try:
         growing = steps_in_thread(grow(site, members, settings), Progress(0.0, "Growing the stand"))
         with closing(growing) as steps:
