@@ -30,7 +30,7 @@ from ..attributes import world_matrix
 from ..job.contents import check_fits, compile_for, in_year, memory_left
 from ..runtime import JobData, job
 from ..scene.ages import classed
-from ..scene.fields import AGE, FIT, NUMBERS, OFFSET, stored_points
+from ..scene.fields import AGE, SIZE_ATTRIBUTES, size_columns, stored_points
 from ..scene.plants import Source, merged, read_sources
 from ..scene.skeletons import skeleton_object_of
 from ..worker import call_in_thread, steps_in_thread
@@ -182,10 +182,8 @@ def _points(place: Floats, rotation: Floats, seeds: Seeds, ages: Floats | None, 
     if ages is not None:
         attributes[AGE] = 'FLOAT', ages.astype(np.float32)
     if sizes is not None:
-        columns = (sizes.height, sizes.diameter, sizes.width, sizes.base, sizes.dead)
-        attributes |= {key: ('FLOAT', of.astype(np.float32)) for key, of in zip(NUMBERS, columns, strict=True)}
-        for key, of in ((OFFSET, sizes.offset), (FIT, sizes.fit)):
-            attributes[key] = 'FLOAT_VECTOR', np.pad(of, ((0, 0), (0, 1))).astype(np.float32)
+        columns = size_columns(sizes).items()
+        attributes |= {name: (SIZE_ATTRIBUTES[name], values.astype(np.float32)) for name, values in columns}
     return attributes
 
 

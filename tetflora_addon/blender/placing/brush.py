@@ -40,15 +40,10 @@ def _brush_of(scene: bpy.types.Scene, pressure: float = 1.0) -> tuple[Brush, tup
     mix = distances.painted_weights(scene)
     if not sum(mix.values()) > 0.0:
         raise SceneError("No species has a weight above 0; raise a weight in the list of species under Layers")
-    brush = Brush(
-        radius=settings.radius,
-        density=settings.density / distances.SQUARE,
-        strength=max(0.01, settings.strength * pressure),
-        min_distance=distances.distance_of(settings),
-        scale_min=settings.scale_min,
-        scale_max=settings.scale_max,
-        weights=tuple(mix.values()),
-    )
+    density, strength = settings.density / distances.SQUARE, max(0.01, settings.strength * pressure)
+    sizes = {"scale_min": settings.scale_min, "scale_max": settings.scale_max}
+    apart = distances.distance_of(settings)
+    brush = Brush(settings.radius, density, strength, min_distance=apart, weights=tuple(mix.values()), **sizes)
     if strokes.too_many(brush):
         raise SceneError(
             f"A brush with a radius of {settings.radius:g} m and {settings.density:g} plants per 100 m² is too large; "

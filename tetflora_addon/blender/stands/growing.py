@@ -305,21 +305,18 @@ def _replace(field: Object, names: list[str], position: Floats, rotation: Floats
     """Give a field the records in place of its points."""
     given = position, rotation, np.ones(len(records)), records.species, records.seed
     other = fields.write_field(NAME, *given, names)
-    sizes = (records.height, records.diameter, records.crown_width, records.crown_base, records.dead, records.offset)
+    numbers = records.height, records.diameter, records.crown_width, records.crown_base, records.dead
+    columns = dict(zip(fields.NUMBERS, numbers, strict=True)) | {
+        fields.OFFSET: np.pad(records.offset, ((0, 0), (0, 1)))
+    }
     field.matrix_world = other.matrix_world.copy()
-    _hand_over(other, field, {**_size_columns(*sizes), fields.YEAR: records.year, fields.PLANT: records.plant})
+    _hand_over(other, field, {**columns, fields.YEAR: records.year, fields.PLANT: records.plant})
     group = field.tetflora
     forms = {entry.species: entry.skeleton for entry in group.field_species}
     group.field_species.clear()
     for name in names:
         entry = group.field_species.add()
         entry.species, entry.skeleton = name, forms.get(name)
-
-
-def _size_columns(*sizes: NDArray) -> dict[str, NDArray]:
-    """Attributes of height, diameter, width and base of the crown, share that is dead, and offset (n, 2) of plants."""
-    names = ("tf_height", "tf_diameter", "tf_crown_width", "tf_crown_base", "tf_dead", fields.OFFSET)
-    return {**dict(zip(names, sizes, strict=True)), fields.OFFSET: np.pad(sizes[-1], ((0, 0), (0, 1)))}
 
 
 def _hand_over(other: Object, field: Object, columns: dict[str, NDArray]) -> None:
@@ -364,11 +361,8 @@ def _stored(sizes: Sizes | None) -> dict[str, NDArray]:
     """Attributes of sizes that say anything."""
     if sizes is None:
         return {}
-    columns = _size_columns(sizes.height, sizes.diameter, sizes.width, sizes.base, sizes.dead, sizes.offset)
-    columns = {name: column for name, column in columns.items() if column.any()}
-    if (sizes.fit != 1.0).any():
-        columns[fields.FIT] = np.pad(sizes.fit, ((0, 0), (0, 1)))
-    return columns
+    silent = fields.FIT if (sizes.fit == 1.0).all() else ""
+    return {name: of for name, of in fields.size_columns(sizes).items() if of.any() and name != silent}
 
 
 def animate(field: Object, first: int, last: int) -> tuple[float, float]:
