@@ -172,13 +172,9 @@ def _settings(field: Object, matrix: Floats) -> dict[str, float | int | str | li
 
 def _points(place: Floats, rotation: Floats, seeds: Seeds, ages: Floats | None, sizes: Sizes | None) -> PointAttributes:
     """Attributes of a field with some plants, in single precision."""
-    attributes = {
-        "position": ('FLOAT_VECTOR', place),
-        "rotation": ('QUATERNION', rotation),
-        "scale": ('FLOAT', seeds.scale.astype(np.float32)),
-        "species": ('INT', seeds.species.astype(np.int32)),
-        "seed": stored_seeds(seeds.seed),
-    }
+    attributes = {"position": ('FLOAT_VECTOR', place), "rotation": ('QUATERNION', rotation)}
+    attributes["scale"] = 'FLOAT', seeds.scale.astype(np.float32)
+    attributes |= {"species": ('INT', seeds.species.astype(np.int32)), "seed": stored_seeds(seeds.seed)}
     if ages is not None:
         attributes[AGE] = 'FLOAT', ages.astype(np.float32)
     if sizes is not None:
@@ -257,17 +253,11 @@ def export_steps(data: JobData, order: ExportOrder) -> Job[Exported]:
 
 
 def _levels(forest: Forest) -> tuple[dict, ...]:
-    return tuple(
-        {
-            "variant": variant.name,
-            "level": number,
-            "polygons": level.polygons,
-            "distance": round(level.distance, 2),
-            "screen_size": round(level.screen_size(variant.height), 4),
-            "cover_error": abs(level.cover),
-            "color_error": level.color,
-            "outline_px": level.outline,
-        }
-        for variant in forest.variants
-        for number, level in enumerate(variant.levels)
-    )
+    figures = []
+    for variant in forest.variants:
+        for number, level in enumerate(variant.levels):
+            one = {"variant": variant.name, "level": number, "polygons": level.polygons}
+            one |= {"distance": round(level.distance, 2), "screen_size": round(level.screen_size(variant.height), 4)}
+            one |= {"cover_error": abs(level.cover), "color_error": level.color, "outline_px": level.outline}
+            figures.append(one)
+    return tuple(figures)

@@ -165,8 +165,7 @@ def _write_level(pxr: SimpleNamespace, stage: object, path: str, level: PlantLev
     prim.CreateFaceVertexCountsAttr(_array(pxr, "Int", np.diff(mesh.face_offsets).astype(np.int32)))
     prim.CreateFaceVertexIndicesAttr(_array(pxr, "Int", mesh.corner_verts))
     prim.CreateDoubleSidedAttr(True)
-    ends = np.stack([mesh.positions.min(axis=0), mesh.positions.max(axis=0)])
-    prim.CreateExtentAttr(_array(pxr, "Vec3f", ends))
+    prim.CreateExtentAttr(_array(pxr, "Vec3f", np.stack([mesh.positions.min(axis=0), mesh.positions.max(axis=0)])))
     prim.CreateNormalsAttr(_array(pxr, "Vec3f", np.concatenate([corner_normals(one) for one in meshes])))
     prim.SetNormalsInterpolation(pxr.UsdGeom.Tokens.faceVarying)
     primvars, types, tokens = pxr.UsdGeom.PrimvarsAPI(prim), pxr.Sdf.ValueTypeNames, pxr.UsdGeom.Tokens

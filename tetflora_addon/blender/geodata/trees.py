@@ -43,7 +43,7 @@ from ..worker import call_in_thread, steps_in_thread
 from .origin import Import, Imported, Steps, importing
 from .terrain import building_areas, heights_steps, read_raster
 
-_UNITS = ("Meters", "Centimeters", "Millimeters", "Feet", "Inches")
+_UNITS = {"AUTO": "Automatic", "m": "Meters", "cm": "Centimeters", "mm": "Millimeters", "ft": "Feet", "in": "Inches"}
 
 
 class TetFloraInventoryColumn(bpy.types.PropertyGroup):
@@ -55,10 +55,7 @@ class TetFloraInventoryColumn(bpy.types.PropertyGroup):
     unit: choice(
         "Unit",
         "Unit of its numbers, where neither they nor the title name one",
-        [
-            ('AUTO', "Automatic", ""),
-            *((unit, label, "") for unit, label in zip(("m", "cm", "mm", "ft", "in"), _UNITS, strict=True)),
-        ],
+        [(unit, label, "") for unit, label in _UNITS.items()],
     )
     values: string("Values", **HIDDEN)
 

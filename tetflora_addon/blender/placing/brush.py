@@ -228,16 +228,15 @@ class Stroke:
         painted = (o.get(plant_objects.PAINTED_MARK) and plant_objects.editable(o) for o in standing.fields)
         number = next((i for i, editable in enumerate(painted) if editable), None)
         if number is None:
-            number = len(standing.fields)
+            number, first = len(standing.fields), 0
             field = plant_objects.add_field(self.scene, placement, species)
             field.name = field.data.name = PAINTED
             field[plant_objects.PAINTED_MARK] = True
             standing.fields.append(field)
-            standing.add(places, number, 0)
-            return
-        field = standing.fields[number]
-        first = len(field.data.vertices)
-        plant_objects.add_points(field, placement, species)
+        else:
+            field = standing.fields[number]
+            first = len(field.data.vertices)
+            plant_objects.add_points(field, placement, species)
         standing.add(places, number, first)
 
 

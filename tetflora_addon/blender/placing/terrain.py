@@ -43,8 +43,7 @@ def ground_form(obj: Object, depsgraph: Depsgraph | None) -> str:
     """
     if depsgraph is None or obj.mode == 'EDIT' or not obj.visible_get(view_layer=depsgraph.view_layer):
         return ""
-    evaluated = obj.evaluated_get(depsgraph)
-    with mesh_of(evaluated) as mesh:
+    with mesh_of(obj.evaluated_get(depsgraph)) as mesh:
         points, corners, place = read(mesh, "position"), len(mesh.loops), world_matrix(obj, depsgraph)
     weight = 0.5 + uniform(np.arange(len(points), dtype=np.uint64), 0)
     mean = (place[:3, :3] @ (weight @ points) + weight.sum() * place[:3, 3]) / max(len(points), 1) ** 0.5

@@ -216,8 +216,7 @@ def _by_suffix(scene: Scene, camera: Camera, depsgraph: Depsgraph) -> tuple[Came
     for other in (scene.objects.get(base + suffix) for suffix in suffixes):
         if other is None or other.type != 'CAMERA' or other == scene.camera:
             continue
-        matrix = world_matrix(other, depsgraph).astype(np.float64)
-        if (placed := _placed(camera, matrix)) is not None:
+        if (placed := _placed(camera, world_matrix(other, depsgraph).astype(np.float64))) is not None:
             cameras.append(replace(placed, window=camera.window))
     return tuple(cameras)
 

@@ -385,10 +385,8 @@ def read_records(obj: Object, parts: Sequence[Points]) -> History | None:
     year = joined([_values(obj, part, YEAR) for part in parts], (0,))
     plant = joined([_values(obj, part, PLANT) for part in parts], (0,))
     refuse(obj, ~(np.abs(year) <= 1e6), f"{YEAR} that is not a year")
-    same = np.zeros(len(plant), bool)
-    same[1:] = plant[1:] == plant[:-1]
-    back = np.zeros(len(plant), bool)
-    back[1:] = same[1:] & (year[1:] <= year[:-1])
+    same = np.append(False, plant[1:] == plant[:-1])[: len(plant)]
+    back = same & np.append(False, year[1:] <= year[:-1])[: len(plant)]
     refuse(obj, back, f"{YEAR} that is not after that of the record before, of the same plant")
     return History(year, np.maximum.accumulate(np.where(same, 0, np.arange(len(plant)))))
 

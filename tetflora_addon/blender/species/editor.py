@@ -226,12 +226,7 @@ def _text(key: str, name: str, description: str) -> Any:
 
 
 _THROUGH = "Fraction of the light scattered by a {} that passes through it"
-_QUALITY = {
-    **dict(zip(("min", "max"), QUALITY_LIMITS, strict=True)),
-    "soft_min": 0.02,
-    "soft_max": 10.0,
-    "precision": 3,
-}
+_QUALITY = {"min": QUALITY_LIMITS[0], "max": QUALITY_LIMITS[1], "soft_min": 0.02, "soft_max": 10.0, "precision": 3}
 
 
 class TetFloraSpeciesEditor(bpy.types.PropertyGroup, SpeciesChoice):

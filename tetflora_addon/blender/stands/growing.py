@@ -64,8 +64,7 @@ def _stand_site(
     if not plantable.any():
         raise SceneError("Vertex Group, Areas, Paths or the biome's limits leave no ground for the stand; change them")
     soil = np.full(height.shape, moisture) + relief * (wetness - _LEVEL), np.full(height.shape, fertility)
-    site = StandSite(0.0, 0.0, grid.cell, height, plantable, *soil, *climate)
-    return site, np.array([grid.west, grid.south])
+    return StandSite(0.0, 0.0, grid.cell, height, plantable, *soil, *climate), np.array([grid.west, grid.south])
 
 
 def _grid(triangles: Floats, relief: float) -> tuple[HeightGrid, Floats]:
@@ -241,8 +240,7 @@ def _again_steps(data: JobData, field: Object, grounds: list[Object]) -> Job[Gro
     stood_on = forms_of(grounds, lambda obj: ground_form(obj, depsgraph))
     site, corner = yield from call_in_thread(progress, _stand_site, ground, climate, stand.slope_max, *soil)
     try:
-        growing = steps_in_thread(grow(site, members, settings), Progress(0.0, "Growing the stand"))
-        with closing(growing) as steps:
+        with closing(steps_in_thread(grow(site, members, settings), Progress(0.0, "Growing the stand"))) as steps:
             records = yield from part_of(steps, _GROWING[0], sum(_GROWING))
     except TetFloraError as error:
         raise SceneError(f'"{field.name}": {error}') from None
