@@ -193,9 +193,8 @@ def ungroup_layer(scene: bpy.types.Scene) -> bool:
     layer = active_layer(scene)
     if not layer.biome or layer.kind == BIOME:
         return False
-    uid = layer.uid
     _put_into(layer, "")
-    _tidy(scene, uid)
+    _tidy(scene, layer.uid)
     return True
 
 

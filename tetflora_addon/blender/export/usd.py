@@ -37,7 +37,7 @@ KEY, PREFIX = "tetflora", "tetflora:"
 FORMAT = 1
 #: Endings of files.
 ENDINGS = (".usdc", ".usda", ".usd")
-LEVELS = "LOD"
+LEVELS, _MATERIALS = "LOD", "/Forest/Materials"
 _TONES = 256.0  # steps of a color, which no display tells apart
 _ARRAYS = {'FLOAT': "Float", 'INT': "Int", 'INT32_2D': "Vec2i", 'FLOAT_VECTOR': "Vec3f", 'QUATERNION': "Quatf"}
 _NAMES = {'FLOAT': "Float", 'INT': "Int", 'INT32_2D': "Int2", 'FLOAT_VECTOR': "Float3", 'QUATERNION': "Quatf"}
@@ -177,7 +177,7 @@ def _write_level(pxr: SimpleNamespace, stage: object, path: str, level: PlantLev
     for kind, one in level.parts:
         faces = np.arange(first, first + one.polygons, dtype=np.int32)
         subset = binding.CreateMaterialBindSubset(kind, _array(pxr, "Int", faces)).GetPrim()
-        material = pxr.UsdShade.Material.Get(stage, _material(variant.surfaces[kind]))
+        material = pxr.UsdShade.Material.Get(stage, f"{_MATERIALS}/{variant.surfaces[kind].name}")
         pxr.UsdShade.MaterialBindingAPI.Apply(subset).Bind(material)
         first += one.polygons
 
@@ -190,13 +190,9 @@ def _add_indexed(pxr: SimpleNamespace, primvar: object, kind: str, values: NDArr
     primvar.SetIndices(_array(pxr, "Int", index.reshape(-1).astype(np.int32)))
 
 
-def _material(surface: BakedSurface) -> str:
-    return f"/Forest/Materials/{surface.name}"
-
-
 def _write_surface(pxr: SimpleNamespace, stage: object, surface: BakedSurface) -> None:
-    types, path = pxr.Sdf.ValueTypeNames, _material(surface)
-    pxr.UsdGeom.Scope.Define(stage, "/Forest/Materials")
+    types, path = pxr.Sdf.ValueTypeNames, f"{_MATERIALS}/{surface.name}"
+    pxr.UsdGeom.Scope.Define(stage, _MATERIALS)
     material = pxr.UsdShade.Material.Define(stage, path)
     shader = pxr.UsdShade.Shader.Define(stage, f"{path}/Surface")
     shader.CreateIdAttr("UsdPreviewSurface")

@@ -306,8 +306,7 @@ def makes_field(population: PropertyGroup, number: int) -> bool:
 def note_erased(population: PropertyGroup, centers: Floats | Sequence, radius: float) -> None:
     """Keep circles on the map bare, with centers (n, 2) or more columns; meters."""
     flat = np.round(np.asarray(centers, dtype=np.float64)[:, :2], _DIGITS).ravel().tolist()
-    strokes = [*_strokes(population), [round(radius, _DIGITS), *flat]]
-    population.erased = json.dumps(strokes, separators=(",", ":"))
+    population.erased = json.dumps([*_strokes(population), [round(radius, _DIGITS), *flat]], separators=(",", ":"))
 
 
 def _strokes(population: PropertyGroup) -> list[list[float]]:

@@ -301,8 +301,7 @@ def _columns(records: Records, site: StandSite, corner: Floats) -> tuple[Floats,
 
 def _replace(field: Object, names: list[str], position: Floats, rotation: Floats, records: Records) -> None:
     """Give a field the records in place of its points."""
-    given = position, rotation, np.ones(len(records)), records.species, records.seed
-    other = fields.write_field(NAME, *given, names)
+    other = fields.write_field(NAME, position, rotation, np.ones(len(records)), records.species, records.seed, names)
     numbers = records.height, records.diameter, records.crown_width, records.crown_base, records.dead
     columns = dict(zip(fields.NUMBERS, numbers, strict=True)) | {
         fields.OFFSET: np.pad(records.offset, ((0, 0), (0, 1)))
