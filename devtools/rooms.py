@@ -26,7 +26,7 @@ PRODUCT = (ADDON, "operators", "panels")
 
 #: Limits of the product: source files, their lines together, lines of one room, levels of imports in ``blender``.
 MAX_FILES = 330
-MAX_LINES = 64_430
+MAX_LINES = 64_217
 MAX_ROOM_LINES = 4_000
 MAX_LEVELS = 10
 

@@ -342,8 +342,7 @@ def lay_biome_soil(depsgraph: Depsgraph, grounds: Sequence[Object]) -> list[str]
         turf += density[:, None] * value["turf"]
         share += density * value["turf_share"]
     earth, turf, share = earth / here[:, None], turf / here[:, None], share / here
-    square = sheet.cell**2
-    lying = 1.0 - np.exp(-hidden / square)
+    lying = 1.0 - np.exp(-hidden / sheet.cell**2)
     mean = SHADED * color / np.maximum(hidden, 1e-12)[:, None]
     ground = earth + (lying * (1.0 - share))[:, None] * (mean - earth)
     shape = sheet.rows, sheet.columns

@@ -233,11 +233,10 @@ def pages_of(scene: Scene, biome: Biome) -> dict[str, dict[str, Any]]:
             of = page.pop("of")
             each = page.pop("every_order", {})
             page = {**(pages[of] if of in pages else species_data(scene, of)), **page}
-            if each and isinstance(page.get("orders"), list):
+            if each and isinstance(orders := page.get("orders"), list):
                 # Where an order has the key already: what bears no leaves has no color of leaves.
                 page["orders"] = [
-                    {**order, **{k: each[k] for k in each.keys() & order.keys()}} if isinstance(order, dict) else order
-                    for order in page["orders"]
+                    {k: each.get(k, v) for k, v in one.items()} if isinstance(one, dict) else one for one in orders
                 ]
             species_from_dict(page, identifier, f'{biome.name}: species "{identifier}"')
         pages[identifier] = page

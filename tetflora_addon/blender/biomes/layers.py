@@ -193,9 +193,8 @@ def ungroup_layer(scene: bpy.types.Scene) -> bool:
     layer = active_layer(scene)
     if not layer.biome or layer.kind == BIOME:
         return False
-    uid = layer.uid
     _put_into(layer, "")
-    _tidy(scene, uid)
+    _tidy(scene, layer.uid)
     return True
 
 
@@ -238,8 +237,7 @@ def _read_older(scene: bpy.types.Scene) -> None:
         return
     kinds = scene.tetflora.bl_rna.properties["layers"].fixed_type.properties["kind"].enum_items
     biomes = [{**one.to_dict(), "kind": kinds[BIOME].value} for one in stored.get("biomes", ())]
-    layers = [*stored.get("layers", ()), *stored["populations"]]
-    stored["layers"] = biomes + [one.to_dict() for one in layers]
+    stored["layers"] = biomes + [one.to_dict() for one in (*stored.get("layers", ()), *stored["populations"])]
     scene.tetflora.layers_index = len(biomes) + stored.get("populations_index", 0)
     for name in ("populations", "populations_index", "biomes", "biomes_index"):
         stored.pop(name, None)

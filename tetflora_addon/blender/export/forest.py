@@ -30,7 +30,7 @@ from ..attributes import world_matrix
 from ..job.contents import check_fits, compile_for, in_year, memory_left
 from ..runtime import JobData, job
 from ..scene.ages import classed
-from ..scene.fields import AGE, FIT, NUMBERS, OFFSET, stored_points
+from ..scene.fields import AGE, SIZE_ATTRIBUTES, size_columns, stored_points
 from ..scene.plants import Source, merged, read_sources
 from ..scene.skeletons import skeleton_object_of
 from ..worker import call_in_thread, steps_in_thread
@@ -147,25 +147,14 @@ def _forest_part(depsgraph: Depsgraph, source: Source, variant: Integers32, scal
     origin = matrix[:3, 3] if whole else origin_near(seeds.position)
     if not whole:
         matrix[:3, 3] = origin
-    position = (seeds.position - origin).astype(np.float32)
-    rotation = quaternions(seeds.frame).astype(np.float32)
-    heights = np.array([one.height for one in shown.variants])[variant] * scale
-    return ForestPart(
-        name,
-        tuple((species_of(kind), getattr(skeleton_object_of(kind), "name_full", "")) for kind in seeds.identifiers),
-        origin,
-        position,
-        rotation,
-        scale.astype(np.float32),
-        variant,
-        seeds.species.astype(np.int32),
-        seeds.seed,
-        np.zeros(len(seeds), np.float32) if ages is None else ages.astype(np.float32),
-        heights.astype(np.float32),
-        stored if whole else _points(position, rotation, seeds, ages, sizes),
-        matrix,
-        _settings(obj, matrix) if whole else {},
-    )
+    kinds = [(species_of(kind), getattr(skeleton_object_of(kind), "name_full", "")) for kind in seeds.identifiers]
+    place = (seeds.position - origin).astype(np.float32), quaternions(seeds.frame).astype(np.float32)
+    identity = variant, seeds.species.astype(np.int32), seeds.seed
+    years = np.zeros(len(seeds), np.float32) if ages is None else ages.astype(np.float32)
+    heights = (np.array([one.height for one in shown.variants])[variant] * scale).astype(np.float32)
+    of_field = (stored, matrix, _settings(obj, matrix)) if whole else (_points(*place, seeds, ages, sizes), matrix, {})
+    columns = *place, scale.astype(np.float32), *identity, years, heights
+    return ForestPart(name, tuple(kinds), origin, *columns, *of_field)
 
 
 def _settings(field: Object, matrix: Floats) -> dict[str, float | int | str | list[float]]:
@@ -183,20 +172,14 @@ def _settings(field: Object, matrix: Floats) -> dict[str, float | int | str | li
 
 def _points(place: Floats, rotation: Floats, seeds: Seeds, ages: Floats | None, sizes: Sizes | None) -> PointAttributes:
     """Attributes of a field with some plants, in single precision."""
-    attributes = {
-        "position": ('FLOAT_VECTOR', place),
-        "rotation": ('QUATERNION', rotation),
-        "scale": ('FLOAT', seeds.scale.astype(np.float32)),
-        "species": ('INT', seeds.species.astype(np.int32)),
-        "seed": stored_seeds(seeds.seed),
-    }
+    attributes = {"position": ('FLOAT_VECTOR', place), "rotation": ('QUATERNION', rotation)}
+    attributes["scale"] = 'FLOAT', seeds.scale.astype(np.float32)
+    attributes |= {"species": ('INT', seeds.species.astype(np.int32)), "seed": stored_seeds(seeds.seed)}
     if ages is not None:
         attributes[AGE] = 'FLOAT', ages.astype(np.float32)
     if sizes is not None:
-        columns = (sizes.height, sizes.diameter, sizes.width, sizes.base, sizes.dead)
-        attributes |= {key: ('FLOAT', of.astype(np.float32)) for key, of in zip(NUMBERS, columns, strict=True)}
-        for key, of in ((OFFSET, sizes.offset), (FIT, sizes.fit)):
-            attributes[key] = 'FLOAT_VECTOR', np.pad(of, ((0, 0), (0, 1))).astype(np.float32)
+        columns = size_columns(sizes).items()
+        attributes |= {name: (SIZE_ATTRIBUTES[name], values.astype(np.float32)) for name, values in columns}
     return attributes
 
 
@@ -270,17 +253,11 @@ def export_steps(data: JobData, order: ExportOrder) -> Job[Exported]:
 
 
 def _levels(forest: Forest) -> tuple[dict, ...]:
-    return tuple(
-        {
-            "variant": variant.name,
-            "level": number,
-            "polygons": level.polygons,
-            "distance": round(level.distance, 2),
-            "screen_size": round(level.screen_size(variant.height), 4),
-            "cover_error": abs(level.cover),
-            "color_error": level.color,
-            "outline_px": level.outline,
-        }
-        for variant in forest.variants
-        for number, level in enumerate(variant.levels)
-    )
+    figures = []
+    for variant in forest.variants:
+        for number, level in enumerate(variant.levels):
+            one = {"variant": variant.name, "level": number, "polygons": level.polygons}
+            one |= {"distance": round(level.distance, 2), "screen_size": round(level.screen_size(variant.height), 4)}
+            one |= {"cover_error": abs(level.cover), "color_error": level.color, "outline_px": level.outline}
+            figures.append(one)
+    return tuple(figures)

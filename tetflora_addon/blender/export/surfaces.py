@@ -347,9 +347,8 @@ def _square(
         for name, uv in (("UVMap", low + corners * extent), ("bake", corners)):
             mesh.uv_layers.new(name=name).uv.foreach_set("vector", np.ascontiguousarray(uv, np.float32).reshape(-1))
         mesh.uv_layers.active = mesh.uv_layers["bake"]
-        write(mesh, "tf_color", np.array([color], np.float32), 'FACE')
-        write(mesh, "tf_transmission", np.array([through], np.float32), 'FACE')
-        write(mesh, "tf_girth", np.array([meters], np.float32), 'FACE')
+        for name, value in (("tf_color", color), ("tf_transmission", through), ("tf_girth", meters)):
+            write(mesh, name, np.array([value], np.float32), 'FACE')
         mesh.materials.append(material)
         scene.collection.objects.link(obj)
         scene.render.engine = 'CYCLES'

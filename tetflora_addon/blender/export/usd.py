@@ -37,7 +37,7 @@ KEY, PREFIX = "tetflora", "tetflora:"
 FORMAT = 1
 #: Endings of files.
 ENDINGS = (".usdc", ".usda", ".usd")
-LEVELS = "LOD"
+LEVELS, _MATERIALS = "LOD", "/Forest/Materials"
 _TONES = 256.0  # steps of a color, which no display tells apart
 _ARRAYS = {'FLOAT': "Float", 'INT': "Int", 'INT32_2D': "Vec2i", 'FLOAT_VECTOR': "Vec3f", 'QUATERNION': "Quatf"}
 _NAMES = {'FLOAT': "Float", 'INT': "Int", 'INT32_2D': "Int2", 'FLOAT_VECTOR': "Float3", 'QUATERNION': "Quatf"}
@@ -107,12 +107,8 @@ def _write_part(pxr: SimpleNamespace, stage: object, path: str, part: ForestPart
     instancer.CreateOrientationsAttr(_array(pxr, "Quath", part.rotation.astype(np.float16)))
     instancer.CreateScalesAttr(_array(pxr, "Vec3f", np.repeat(part.scale[:, None], 3, axis=1)))
     primvars = pxr.UsdGeom.PrimvarsAPI(instancer)
-    columns = {
-        "species": ('INT', part.species),
-        "seed": stored_seeds(part.seed),
-        "age": ('FLOAT', part.age),
-        "height": ('FLOAT', part.height),
-    }
+    columns = {"species": ('INT', part.species), "seed": stored_seeds(part.seed)}
+    columns |= {"age": ('FLOAT', part.age), "height": ('FLOAT', part.height)}
     for name, (kind, values) in columns.items():
         _add(pxr, primvars, name, kind, values)
     known = {"position": ('FLOAT_VECTOR', part.position), **{name: columns[name] for name in ("seed", "species")}}
@@ -123,21 +119,11 @@ def _write_part(pxr: SimpleNamespace, stage: object, path: str, part: ForestPart
         stored[name] = kind if same else f"{kind} {PREFIX}{name}"
         if not same:
             _add(pxr, primvars, PREFIX + name, kind, values)
-    instancer.GetPrim().SetCustomDataByKey(
-        KEY,
-        {
-            "format": FORMAT,
-            "name": part.name,
-            "species": pxr.Vt.StringArray([species for species, _ in part.kinds]),
-            "forms": pxr.Vt.StringArray([form for _, form in part.kinds]),
-            "attributes": stored,
-            "matrix": pxr.Gf.Matrix4d(np.asarray(part.matrix, np.float64).T.tolist()),
-            "object": {
-                key: pxr.Vt.DoubleArray(value) if isinstance(value, list) else value
-                for key, value in part.settings.items()
-            },
-        },
-    )
+    species, forms = (pxr.Vt.StringArray([kind[i] for kind in part.kinds]) for i in (0, 1))
+    told = {"format": FORMAT, "name": part.name, "species": species, "forms": forms, "attributes": stored}
+    told["matrix"] = pxr.Gf.Matrix4d(np.asarray(part.matrix, np.float64).T.tolist())
+    lists = {key: pxr.Vt.DoubleArray(value) for key, value in part.settings.items() if isinstance(value, list)}
+    instancer.GetPrim().SetCustomDataByKey(KEY, {**told, "object": part.settings | lists})
 
 
 def stored_seeds(seed: Integers) -> tuple[str, NDArray[np.int32]]:
@@ -179,8 +165,7 @@ def _write_level(pxr: SimpleNamespace, stage: object, path: str, level: PlantLev
     prim.CreateFaceVertexCountsAttr(_array(pxr, "Int", np.diff(mesh.face_offsets).astype(np.int32)))
     prim.CreateFaceVertexIndicesAttr(_array(pxr, "Int", mesh.corner_verts))
     prim.CreateDoubleSidedAttr(True)
-    ends = np.stack([mesh.positions.min(axis=0), mesh.positions.max(axis=0)])
-    prim.CreateExtentAttr(_array(pxr, "Vec3f", ends))
+    prim.CreateExtentAttr(_array(pxr, "Vec3f", np.stack([mesh.positions.min(axis=0), mesh.positions.max(axis=0)])))
     prim.CreateNormalsAttr(_array(pxr, "Vec3f", np.concatenate([corner_normals(one) for one in meshes])))
     prim.SetNormalsInterpolation(pxr.UsdGeom.Tokens.faceVarying)
     primvars, types, tokens = pxr.UsdGeom.PrimvarsAPI(prim), pxr.Sdf.ValueTypeNames, pxr.UsdGeom.Tokens
@@ -192,7 +177,7 @@ def _write_level(pxr: SimpleNamespace, stage: object, path: str, level: PlantLev
     for kind, one in level.parts:
         faces = np.arange(first, first + one.polygons, dtype=np.int32)
         subset = binding.CreateMaterialBindSubset(kind, _array(pxr, "Int", faces)).GetPrim()
-        material = pxr.UsdShade.Material.Get(stage, _material(variant.surfaces[kind]))
+        material = pxr.UsdShade.Material.Get(stage, f"{_MATERIALS}/{variant.surfaces[kind].name}")
         pxr.UsdShade.MaterialBindingAPI.Apply(subset).Bind(material)
         first += one.polygons
 
@@ -205,13 +190,9 @@ def _add_indexed(pxr: SimpleNamespace, primvar: object, kind: str, values: NDArr
     primvar.SetIndices(_array(pxr, "Int", index.reshape(-1).astype(np.int32)))
 
 
-def _material(surface: BakedSurface) -> str:
-    return f"/Forest/Materials/{surface.name}"
-
-
 def _write_surface(pxr: SimpleNamespace, stage: object, surface: BakedSurface) -> None:
-    types, path = pxr.Sdf.ValueTypeNames, _material(surface)
-    pxr.UsdGeom.Scope.Define(stage, "/Forest/Materials")
+    types, path = pxr.Sdf.ValueTypeNames, f"{_MATERIALS}/{surface.name}"
+    pxr.UsdGeom.Scope.Define(stage, _MATERIALS)
     material = pxr.UsdShade.Material.Define(stage, path)
     shader = pxr.UsdShade.Shader.Define(stage, f"{path}/Surface")
     shader.CreateIdAttr("UsdPreviewSurface")
@@ -241,12 +222,9 @@ def _add_texture(pxr: SimpleNamespace, stage: object, path: str, name: str, file
     image.CreateInput("wrapT", types.Token).Set("repeat")
     image.CreateInput("sourceColorSpace", types.Token).Set("sRGB" if name == "color" else "raw")
     image.CreateInput("st", types.Float2).ConnectToSource(place.ConnectableAPI(), "result")
-    key, output, of = {
-        "color": ("diffuseColor", "rgb", types.Color3f),
-        "roughness": ("roughness", "r", types.Float),
-        "opacity": ("opacity", "r", types.Float),
-        "normal": ("normal", "rgb", types.Normal3f),
-    }[name]
+    colored = {"color": ("diffuseColor", types.Color3f), "normal": ("normal", types.Normal3f)}
+    key, of = colored.get(name, (name, types.Float))
+    output = "rgb" if name in colored else "r"
     if name == "normal":
         image.CreateInput("scale", types.Float4).Set(pxr.Gf.Vec4f(2.0, 2.0, 2.0, 1.0))
         image.CreateInput("bias", types.Float4).Set(pxr.Gf.Vec4f(-1.0, -1.0, -1.0, 0.0))
@@ -330,7 +308,7 @@ def forest_steps(order: Import, mix: Mapping[str, float]) -> Steps:
     """
     yield Progress(0.0, f"Reading {order.path.name}")
     fields: list[bpy.types.Object] = []
-    whole, missing, number = False, [], 0
+    missing, number = [], 0
     try:
         for name, data, points in _read_parts(order.path):
             if data and int(data.get("format", 0)) > FORMAT:
@@ -345,12 +323,11 @@ def forest_steps(order: Import, mix: Mapping[str, float]) -> Steps:
             yield Progress(0.5, f"{number:,} plants")
         for field in fields:
             link_field(order.scene, field)
-        whole = True
-    finally:
-        if not whole:
-            meshes = [field.data for field in fields]
-            bpy.data.batch_remove(fields)
-            bpy.data.batch_remove(meshes)
+    except BaseException:  # an error, or Esc
+        meshes = [field.data for field in fields]
+        bpy.data.batch_remove(fields)
+        bpy.data.batch_remove(meshes)
+        raise
     told = [f"{number:,} plants imported", f"{len(fields):,} field{'s' * (len(fields) > 1)}"]
     if missing:
         told.append(f"without their forms, which this file has no objects for: {listed(sorted(set(missing)))}")

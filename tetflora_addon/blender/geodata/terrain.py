@@ -234,8 +234,7 @@ def _mesh(name: str, points: NDArray, faces: NDArray, uv: NDArray, material: Mat
     write(mesh, mesh.uv_layers.new(name="UVMap").name, uv[faces.ravel()])
     if material is None:
         low, high = points[:, :2].min(axis=0), points[:, :2].max(axis=0)
-        shape = (2, 2)
-        colors, green = np.broadcast_to(_SOIL, (*shape, 3)), np.full(shape, _COVERED)
+        colors, green = np.broadcast_to(_SOIL, (2, 2, 3)), np.full((2, 2), _COVERED)
         material = soil_material(f"{name} soil", colors, green, np.array(_GREEN), low, high - low)
     mesh.materials.append(material)
     obj = bpy.data.objects.new(name, mesh)
@@ -314,12 +313,9 @@ def outline_steps(order: Import, kind: str = "") -> Steps:
 
 def building_areas(scene: Scene) -> list[Floats]:
     """Borders (k, 2) of the buildings that were imported into a scene, in world space."""
-    return [
-        (members(spline.points, "co", 4).astype(np.float64) @ np.array(obj.matrix_world).T)[:, :2]
-        for obj in scene.objects
-        if obj.type == 'CURVE' and obj.get(BUILDING_MARK)
-        for spline in obj.data.splines[:1]
-    ]
+    buildings = [obj for obj in scene.objects if obj.type == 'CURVE' and obj.get(BUILDING_MARK)]
+    walls = [(obj, members(spline.points, "co", 4)) for obj in buildings for spline in obj.data.splines[:1]]
+    return [(corners.astype(np.float64) @ np.array(obj.matrix_world).T)[:, :2] for obj, corners in walls]
 
 
 def _remove(collections: list[Collection]) -> None:

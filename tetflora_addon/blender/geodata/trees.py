@@ -43,7 +43,7 @@ from ..worker import call_in_thread, steps_in_thread
 from .origin import Import, Imported, Steps, importing
 from .terrain import building_areas, heights_steps, read_raster
 
-_UNITS = ("Meters", "Centimeters", "Millimeters", "Feet", "Inches")
+_UNITS = {"AUTO": "Automatic", "m": "Meters", "cm": "Centimeters", "mm": "Millimeters", "ft": "Feet", "in": "Inches"}
 
 
 class TetFloraInventoryColumn(bpy.types.PropertyGroup):
@@ -55,10 +55,7 @@ class TetFloraInventoryColumn(bpy.types.PropertyGroup):
     unit: choice(
         "Unit",
         "Unit of its numbers, where neither they nor the title name one",
-        [
-            ('AUTO', "Automatic", ""),
-            *((unit, label, "") for unit, label in zip(("m", "cm", "mm", "ft", "in"), _UNITS, strict=True)),
-        ],
+        [(unit, label, "") for unit, label in _UNITS.items()],
     )
     values: string("Values", **HIDDEN)
 
@@ -177,13 +174,9 @@ def inventory_steps(
         inside = box.holds(inventory.points)
         if not inside.any():
             raise order.nothing_left()
-        inventory = replace(
-            inventory,
-            name=inventory.name[inside],
-            points=inventory.points[inside],
-            sizes={name: values[inside] for name, values in inventory.sizes.items()},
-            notes=[*inventory.notes, f"{(~inside).sum():,} beyond the Crop"],
-        )
+        sizes = {name: values[inside] for name, values in inventory.sizes.items()}
+        inventory = replace(inventory, name=inventory.name[inside], points=inventory.points[inside], sizes=sizes)
+        inventory = replace(inventory, notes=[*inventory.notes, f"{(~inside).sum():,} beyond the Crop"])
     place = order.origin(inventory.points, inventory.system)
     flat = order.local(place, inventory.points, inventory.system)
     identifiers, kinds, kin, others = _species(inventory, unknown)
@@ -279,11 +272,9 @@ def canopy_steps(order: Import, mix: Mapping[str, float], least: float, below: P
     keys = child_key(child_key(key_of_seed(0), _SPECIES), np.arange(number))
     kinds = species_by_weight(tuple(mix.values()), uniform(keys, 0))
     unit = np.stack([along / np.linalg.norm(along), down / np.linalg.norm(down)])
-    sizes = {
-        "height": trees.height.astype(np.float32),
-        "crown_width": trees.width.astype(np.float32),
-        "offset": np.column_stack([trees.offset @ unit, np.zeros(number)]).astype(np.float32),
-    }
+    offset = np.column_stack([trees.offset @ unit, np.zeros(number)])
+    sizes = {"height": trees.height, "crown_width": trees.width, "offset": offset}
+    sizes = {name: values.astype(np.float32) for name, values in sizes.items()}
     imported = yield from _plant(order, place, flat, kinds, identifiers, sizes)
     imported.told += notes
     return imported

@@ -40,15 +40,10 @@ def _brush_of(scene: bpy.types.Scene, pressure: float = 1.0) -> tuple[Brush, tup
     mix = distances.painted_weights(scene)
     if not sum(mix.values()) > 0.0:
         raise SceneError("No species has a weight above 0; raise a weight in the list of species under Layers")
-    brush = Brush(
-        radius=settings.radius,
-        density=settings.density / distances.SQUARE,
-        strength=max(0.01, settings.strength * pressure),
-        min_distance=distances.distance_of(settings),
-        scale_min=settings.scale_min,
-        scale_max=settings.scale_max,
-        weights=tuple(mix.values()),
-    )
+    density, strength = settings.density / distances.SQUARE, max(0.01, settings.strength * pressure)
+    sizes = {"scale_min": settings.scale_min, "scale_max": settings.scale_max}
+    apart = distances.distance_of(settings)
+    brush = Brush(settings.radius, density, strength, min_distance=apart, weights=tuple(mix.values()), **sizes)
     if strokes.too_many(brush):
         raise SceneError(
             f"A brush with a radius of {settings.radius:g} m and {settings.density:g} plants per 100 m² is too large; "
@@ -233,16 +228,15 @@ class Stroke:
         painted = (o.get(plant_objects.PAINTED_MARK) and plant_objects.editable(o) for o in standing.fields)
         number = next((i for i, editable in enumerate(painted) if editable), None)
         if number is None:
-            number = len(standing.fields)
+            number, first = len(standing.fields), 0
             field = plant_objects.add_field(self.scene, placement, species)
             field.name = field.data.name = PAINTED
             field[plant_objects.PAINTED_MARK] = True
             standing.fields.append(field)
-            standing.add(places, number, 0)
-            return
-        field = standing.fields[number]
-        first = len(field.data.vertices)
-        plant_objects.add_points(field, placement, species)
+        else:
+            field = standing.fields[number]
+            first = len(field.data.vertices)
+            plant_objects.add_points(field, placement, species)
         standing.add(places, number, first)
 
 

@@ -107,11 +107,8 @@ def read_suits(
     if above is None or not wanted:
         return dict
     canopy, names = above
-    asked = {
-        number: (Habitat[wanted[name].habitat], shedder_of(wanted[name], names), population.seed + number)
-        for number, name in enumerate(species)
-        if name in wanted
-    }
+    entries = [(number, wanted[name]) for number, name in enumerate(species) if name in wanted]
+    asked = {n: (Habitat[e.habitat], shedder_of(e, names), population.seed + n) for n, e in entries}
 
     def suits() -> dict[int, Suits]:
         floor = run_to_end(floor_steps(canopy, triangles, len(names)))

@@ -209,14 +209,9 @@ def _plant(scene: bpy.types.Scene, seed: int) -> None:
     for number, (layer, place) in enumerate(zip(LAYERS, places(seed), strict=True)):
         keys = child_key(child_key(key_of_seed(seed), 100 + number), np.arange(len(place)))
         scale = layer.smallest + (layer.largest - layer.smallest) * uniform(keys, 1)
-        placement = Placement(
-            position=np.column_stack([place, height(place[:, 0], place[:, 1])]),
-            azimuth=2.0 * np.pi * uniform(keys, 2),
-            scale=scale,
-            species=np.zeros(len(place), np.int32),
-            seed=(uniform(keys, 3) * 2**31).astype(np.int32),
-            wanted=layer.number,
-        )
+        position, azimuth = np.column_stack([place, height(*place.T)]), 2.0 * np.pi * uniform(keys, 2)
+        species, seeds = np.zeros(len(place), np.int32), (uniform(keys, 3) * 2**31).astype(np.int32)
+        placement = Placement(position, azimuth, scale, species, seeds, layer.number)
         run_to_end(add_plants_steps(scene, placement, [layer.species if layer.species in known else default_species()]))
 
 

@@ -72,14 +72,8 @@ def add_plant(
     scene: Scene, position: Sequence[float], azimuth: float, scale: float, seed: int, species: str
 ) -> list[Object]:
     """Make the empty of one plant, with its trunk's base at a position in world space; a list of it."""
-    placement = Placement(
-        position=np.array([position], dtype=np.float64),
-        azimuth=np.array([azimuth]),
-        scale=np.array([scale]),
-        species=np.zeros(1, np.int32),
-        seed=np.array([seed]),
-        wanted=1,
-    )
+    place = np.array([position], dtype=np.float64), np.array([azimuth])
+    placement = Placement(*place, np.array([scale]), np.zeros(1, np.int32), np.array([seed]), wanted=1)
     return run_to_end(add_plants_steps(scene, placement, [species]))
 
 
@@ -350,22 +344,15 @@ Points = dict[str, tuple[str, NDArray]]
 
 def editable(obj: Object) -> bool:
     """Whether points of a field can be taken and added: it is of TetFlora's making, and still as simple."""
-    return (
-        bool(obj.get(FIELD_MARK))
-        and obj.type == 'MESH'
-        and obj.library is None
-        and obj.data.library is None
-        and obj.override_library is None
-        and obj.mode == 'OBJECT'
-        and not obj.modifiers
-        and not obj.vertex_groups
-        and not obj.data.edges
-        and not obj.data.polygons
-        and obj.data.shape_keys is None
-        and not fields.has_history(obj)
-        and all(a.data_type in KINDS for a in obj.data.attributes if not a.is_internal)
-        and all(a.data_type == fields.FIELD_ATTRIBUTES.get(a.name, a.data_type) for a in obj.data.attributes)
-    )
+    if not obj.get(FIELD_MARK) or obj.type != 'MESH' or obj.mode != 'OBJECT' or fields.has_history(obj):
+        return False
+    mesh = obj.data
+    if obj.library or mesh.library or obj.override_library or mesh.shape_keys:
+        return False
+    if any(map(len, (obj.modifiers, obj.vertex_groups, mesh.edges, mesh.polygons))):
+        return False
+    known = all(a.data_type in KINDS for a in mesh.attributes if not a.is_internal)
+    return known and all(a.data_type == fields.FIELD_ATTRIBUTES.get(a.name, a.data_type) for a in mesh.attributes)
 
 
 def positions(obj: Object) -> Floats:
@@ -403,22 +390,17 @@ def add_points(obj: Object, placement: Placement, species: Sequence[str]) -> Non
     turn = np.array(obj.matrix_world.to_3x3().normalized(), dtype=np.float64)
     c, s, none = np.cos(placement.azimuth), np.sin(placement.azimuth), np.zeros(len(placement))
     frame = np.stack([c, -s, none, s, c, none, none, none, none + 1.0], axis=1).reshape(-1, 3, 3)
-    added = {
-        "position": (placement.position - world[:3, 3]) @ np.linalg.inv(world[:3, :3]).T,
-        "rotation": quaternions(turn.T @ frame),
-        "scale": placement.scale / size,
-        "species": numbers[placement.species],
-        "seed": placement.seed,
-    }
+    added = {"rotation": quaternions(turn.T @ frame), "scale": placement.scale / size, "seed": placement.seed}
+    added["position"] = (placement.position - world[:3, 3]) @ np.linalg.inv(world[:3, :3]).T
+    added["species"] = numbers[placement.species]
     points, before = _points(obj.data), len(obj.data.vertices)
     for name, kind in {"position": 'FLOAT_VECTOR', **fields.FIELD_ATTRIBUTES}.items():
         if name not in points:  # of a mesh that never had any point, not even that
             points[name] = (kind, np.full((before, *added[name].shape[1:]), name == "scale", KINDS[kind].dtype))
-    joined: Points = {}
     for name, (kind, values) in points.items():
         new = added.get(name, np.zeros((len(placement), *values.shape[1:])))
-        joined[name] = (kind, np.concatenate([values, new.astype(values.dtype)]))
-    write_points(own_mesh(obj), joined)
+        points[name] = (kind, np.concatenate([values, new.astype(values.dtype)]))
+    write_points(own_mesh(obj), points)
 
 
 def assign_field_species(obj: Object, identifier: str) -> bool:

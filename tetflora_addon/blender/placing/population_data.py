@@ -132,10 +132,9 @@ def _check_number(where: str, prop: Property, value: Any) -> None:
         raise ValueError(f"{where} is {quoted(value)}; it must be a {'whole ' if whole else ''}number")
     if not whole and not abs(value) <= float_info.max:  # of whole numbers, which have no end, as well
         raise ValueError(f"{where} is {quoted(value)}; it must be a finite number")
-    angle = prop.subtype == 'ANGLE'
     # Bounds are single-precision numbers: 0.1 as a file has it is less than 0.1 as Blender stores it.
     with np.errstate(over="ignore"):
-        stored = value if whole else float(np.float32(radians(value) if angle else value))
+        stored = value if whole else float(np.float32(radians(value) if prop.subtype == 'ANGLE' else value))
     if not prop.hard_min <= stored <= prop.hard_max:
         raise ValueError(f"{where} is {quoted(value)}; it must be {limits_of(prop)}")
 

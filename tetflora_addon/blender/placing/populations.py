@@ -24,7 +24,7 @@ from ...species.kinds import MOST_YEARS, Kind
 from ..assets.marks import measure_all
 from ..runtime import JobData, is_there, job
 from ..scene.crowns import crown_steps
-from ..scene.fields import fields_of, stored_size
+from ..scene.fields import stored_size
 from ..settings import BIOME, SCATTER, with_identity
 from ..species.edits import revert_species
 from ..worker import call_in_thread, run_to_end
@@ -141,9 +141,7 @@ def make_plants_steps(data: JobData, population: TetFloraLayer, later: Sequence[
         objects[0].display_type = 'BOUNDS'  # its points would turn the ground black, and many take long to draw
     elif present:
         objects = run_to_end(plant_objects.add_plants_steps(scene, placement, search.species, collection, ages))
-    for number, obj in enumerate(objects):
-        group = obj.tetflora
-        group.population, group.population_number = population.uid, number
+    adopt(scene, population, objects)
     if not objects:
         plant_objects.remove_empty_collections()
     population.made, population.message = len(placement), placement.reason
@@ -272,10 +270,9 @@ def _release(objects: Iterable[Object]) -> None:
         obj.tetflora.property_unset("population_number")
 
 
-def _remove(objects: Iterable[Object]) -> None:
-    objects = list(objects)
-    plants, fields = plant_objects.plants_of(objects), fields_of(objects)
-    plant_objects.remove_fields(fields, tidy=False)  # the collection keeps what the artist set for it
+def _remove(objects: Sequence[Object]) -> None:
+    plants = plant_objects.plants_of(objects)
+    plant_objects.remove_fields(objects, tidy=False)  # the collection keeps what the artist set for it
     bpy.data.batch_remove(plants)
 
 

@@ -57,6 +57,7 @@ def _choose_distance(settings: PropertyGroup, by_species: bool) -> None:
 
 #: Options of settings that the preview follows.
 LIVE = {**FIXED, "update": lambda _group, _context: listeners.notify()}
+_FACTOR, _STORED = {**FACTOR, **LIVE}, {**LIVE, **HIDDEN}
 _COMPANION = properties_of(Companion, **LIVE)
 _DISTANCE = {**FIXED, "update": _on_distance}
 _BY_SPECIES = partial(
@@ -67,16 +68,10 @@ _BY_SPECIES = partial(
     get=follows_species,
     set=_choose_distance,
 )
-#: The age of a plant, and the tooltip of that of a population.
-AGE = partial(
-    real,
-    "Age",
-    "Age in years; 0 is full-grown, as the species describes it. Species that are assets have none",
-    **within(0.0, 200.0, MOST_YEARS),
-    step=100,
-    precision=1,
-)
-_AGE = "Age of the plants in years, half of them younger and half older; 0 is full-grown, as the species describes it"
+#: The age of a plant.
+_YEARS = {**within(0.0, 200.0, MOST_YEARS), "step": 100, "precision": 1}
+_GROWN = "0 is full-grown, as the species describes it"
+AGE = partial(real, "Age", f"Age in years; {_GROWN}. Species that are assets have none", **_YEARS)
 _SOURCE = partial(choice, "Distance From", "", SOURCES, default='SPECIES', **HIDDEN)
 
 
@@ -94,7 +89,7 @@ class TetFloraMixEntry(PropertyGroup, SpeciesChoice):
     """One species of a mixture to populate with, and its companion."""
 
     weight: real("Weight", "Relative frequency of this species among the plants", 1.0, **within(0.0, 10.0), **LIVE)
-    companion: string("Companion", "Species that this one seeks or avoids; empty for none", **{**LIVE, **HIDDEN})
+    companion: string("Companion", "Species that this one seeks or avoids; empty for none", **_STORED)
     companion_choice: once.choice(
         "Companion",
         "Species that this one seeks or avoids, in this population or planted earlier",
@@ -105,7 +100,7 @@ class TetFloraMixEntry(PropertyGroup, SpeciesChoice):
     companion_strength: _COMPANION.strength
     companion_distance: _COMPANION.distance
     habitat: choice("Grows", "Where under the other plants this species is found", HABITATS, default='ANYWHERE', **LIVE)
-    shed_by: string("Shed By", "Species that sheds what lies there; any if empty", **{**LIVE, **HIDDEN})
+    shed_by: string("Shed By", "Species that sheds what lies there; any if empty", **_STORED)
 
 
 class TetFloraGround(PropertyGroup):
@@ -116,7 +111,7 @@ class TetFloraGround(PropertyGroup):
         "Ground",
         "Mesh that the plants grow on, including its modifiers",
         poll=lambda _group, candidate: candidate.type == 'MESH' and not candidate.tetflora.is_field,
-        **{**LIVE, **HIDDEN},
+        **_STORED,
     )
 
 
@@ -177,10 +172,13 @@ def _set_limits(owner: PropertyGroup, bits: int) -> None:
     listeners.notify()
 
 
+_SWITCHES = {"options": {'ENUM_FLAG', 'SKIP_SAVE'}, "get": limits_in_use, "set": _set_limits}
+
+
 class GroundMask:
     """Mix-in: where on its grounds something grows, by a vertex group and an image, and whether altitudes count."""
 
-    use_altitude: boolean("Altitude", "Grow only between two heights above the scene's origin", **{**LIVE, **HIDDEN})
+    use_altitude: boolean("Altitude", "Grow only between two heights above the scene's origin", **_STORED)
 
     vertex_group: string("Vertex Group", "Weights that say where plants grow: 0 is bare, 1 is full", **LIVE)
     invert_group: boolean("Invert Vertex Group", "Weight 1 is bare, 0 is full", **LIVE)
@@ -194,14 +192,7 @@ class GroundMask:
 class AroundPaths:
     """Mix-in: which limits of where something grows panels show; inside which areas, and how far from which paths."""
 
-    limits: choice(
-        "Limits",
-        "What limits where this grows; switched off, it no longer does",
-        _limit_items,
-        options={'ENUM_FLAG', 'SKIP_SAVE'},
-        get=limits_in_use,
-        set=_set_limits,
-    )
+    limits: choice("Limits", "What limits where this grows; switched off, it no longer does", _limit_items, **_SWITCHES)
     limits_shown: integer("Limits That Are Shown", **HIDDEN)
     areas: pointer_to(
         Collection, "Areas", "Collection of closed curves; plants grow only inside them, as seen from above", **LIVE
@@ -282,13 +273,12 @@ class TetFloraLayer(PropertyGroup, settings_in(Limits, Rules, **LIVE), GroundMas
     distance_from: _SOURCE()
     distance_by_species: _BY_SPECIES()
 
-    age: real("Age", _AGE, **{**AGE.keywords, **LIVE})
+    age: real("Age", f"Age of the plants in years, half of them younger and half older; {_GROWN}", **_YEARS, **LIVE)
     age_spread: real(
         "Age Spread",
         "How much the ages of plants differ: about two in three are within this fraction of Age, and as many "
         "younger as older. 0 for plants of one age",
-        **FACTOR,
-        **LIVE,
+        **_FACTOR,
     )
 
     biome: string("Biome", **HIDDEN)  # ``uid`` of the biome of which it is a layer
@@ -308,6 +298,15 @@ MODES = (
     ('THIN', "Thin", "Remove plants above the density, or closer than the minimum distance", 'PARTICLES', 2),
 )
 _BRUSH = properties_of(Brush, **FIXED)
+_PAINTED = (
+    ('MIX', "Active Layer", "The species of the active layer, by weight", 0),
+    ('ONE', "One Species", "The species below", 1),
+)
+_PAINTED_AS = (
+    ('AUTOMATIC', "Automatic", f"Empties up to {MOST_PAINTED_EMPTIES:,}, then a field of painted plants", 0),
+    STORAGE_ITEMS[1],
+    ('FIELD', "Field", 'One object, "Painted plants", whose vertices are the plants. Room for millions', 2),
+)
 
 
 class TetFloraBrush(PropertyGroup, settings_in(Rules, only=("scale_min", "scale_max"), **FIXED), SpeciesChoice):
@@ -327,24 +326,9 @@ class TetFloraBrush(PropertyGroup, settings_in(Rules, only=("scale_min", "scale_
     min_distance: properties_of(Brush, **_DISTANCE).min_distance
     distance_from: _SOURCE()
     distance_by_species: _BY_SPECIES()
-    source: choice(
-        "Species",
-        "What to paint",
-        (
-            ('MIX', "Active Layer", "The species of the active layer, by weight", 0),
-            ('ONE', "One Species", "The species below", 1),
-        ),
-        **FIXED,
-    )
+    source: choice("Species", "What to paint", _PAINTED, **FIXED)
     store: choice(
-        "Create As",
-        "What painted plants are created as. Erase and Thin affect both kinds",
-        (
-            ('AUTOMATIC', "Automatic", f"Empties up to {MOST_PAINTED_EMPTIES:,}, then a field of painted plants", 0),
-            STORAGE_ITEMS[1],
-            ('FIELD', "Field", 'One object, "Painted plants", whose vertices are the plants. Room for millions', 2),
-        ),
-        **FIXED,
+        "Create As", "What painted plants are created as. Erase and Thin affect both kinds", _PAINTED_AS, **FIXED
     )
     seed: integer("Seed", **HIDDEN)
     strokes: integer("Strokes", "Strokes painted so far; each draws its own random numbers", min=0, **HIDDEN)

@@ -288,11 +288,8 @@ def rules_from(population: PropertyGroup) -> tuple[Rules, tuple[str, ...]]:
         if entry.companion:
             weights.setdefault(entry.companion, 0.0)
     species = tuple(weights)
-    companions = tuple(
-        Companion(species.index(identifier), species.index(e.companion), e.companion_strength, e.companion_distance)
-        for identifier, e in mix
-        if e.companion and e.companion_strength
-    )
+    pairs = [(species.index(s), species.index(e.companion), e) for s, e in mix if e.companion and e.companion_strength]
+    companions = tuple(Companion(a, b, e.companion_strength, e.companion_distance) for a, b, e in pairs)
     free = ("min_distance", "altitude_min", "altitude_max", "density", "weights", "companions")
     given = {name: getattr(population, name) for name in Rules.__dataclass_fields__ if name not in free}
     low, high = (population.altitude_min, population.altitude_max) if population.use_altitude else (-inf, inf)
@@ -309,8 +306,7 @@ def makes_field(population: PropertyGroup, number: int) -> bool:
 def note_erased(population: PropertyGroup, centers: Floats | Sequence, radius: float) -> None:
     """Keep circles on the map bare, with centers (n, 2) or more columns; meters."""
     flat = np.round(np.asarray(centers, dtype=np.float64)[:, :2], _DIGITS).ravel().tolist()
-    strokes = [*_strokes(population), [round(radius, _DIGITS), *flat]]
-    population.erased = json.dumps(strokes, separators=(",", ":"))
+    population.erased = json.dumps([*_strokes(population), [round(radius, _DIGITS), *flat]], separators=(",", ":"))
 
 
 def _strokes(population: PropertyGroup) -> list[list[float]]:
@@ -423,12 +419,9 @@ def read_search(
     suits = read_suits(population, ground.triangles, species, above)
     present = _standing(depsgraph, ignored, species)
     zones = _read_zones(depsgraph, population, grounds)
-    erased = (  # circles, as lines of one point
-        Path(center[None], stroke[0])
-        for stroke in _strokes(population)
-        for center in np.array(stroke[1:], dtype=np.float64).reshape(-1, 2)
-    )
-    return Search(ground, rules, present, suits, tuple(erased), species, zones)
+    circles = [(radius, np.array(centers, np.float64).reshape(-1, 2)) for radius, *centers in _strokes(population)]
+    erased = tuple(Path(center[None], radius) for radius, centers in circles for center in centers)  # of one point
+    return Search(ground, rules, present, suits, erased, species, zones)
 
 
 def _standing(depsgraph: Depsgraph, without: Collection[Object], species: Sequence[str]) -> tuple[Floats, Integers32]:

@@ -43,8 +43,7 @@ def ground_form(obj: Object, depsgraph: Depsgraph | None) -> str:
     """
     if depsgraph is None or obj.mode == 'EDIT' or not obj.visible_get(view_layer=depsgraph.view_layer):
         return ""
-    evaluated = obj.evaluated_get(depsgraph)
-    with mesh_of(evaluated) as mesh:
+    with mesh_of(obj.evaluated_get(depsgraph)) as mesh:
         points, corners, place = read(mesh, "position"), len(mesh.loops), world_matrix(obj, depsgraph)
     weight = 0.5 + uniform(np.arange(len(points), dtype=np.uint64), 0)
     mean = (place[:3, :3] @ (weight @ points) + weight.sum() * place[:3, 3]) / max(len(points), 1) ** 0.5
@@ -178,19 +177,11 @@ def read_ground(
     weights = np.concatenate(weight) if vertex_group else None
     if weights is not None and invert_group:
         weights = 1.0 - weights
-    gray = None
-    if image is not None:
-        gray = _luminance(image)
-        gray = 1.0 - gray if invert_image else gray
-    return Terrain(
-        triangles=np.concatenate(triangles),
-        weight=weights,
-        uv=None if image is None else np.concatenate(uv),
-        image=gray,
-        areas=() if areas is None else tuple(line.points for line in _lines(areas, depsgraph, "Areas", closed=True)),
-        paths=() if paths is None else tuple(_path(line, path_distance) for line in _lines(paths, depsgraph, "Paths")),
-        border=np.concatenate(border),
-    )
+    corners, gray = (None, None) if image is None else (np.concatenate(uv), _luminance(image))
+    gray = 1.0 - gray if image is not None and invert_image else gray
+    inside = () if areas is None else tuple(line.points for line in _lines(areas, depsgraph, "Areas", closed=True))
+    bare = () if paths is None else tuple(_path(line, path_distance) for line in _lines(paths, depsgraph, "Paths"))
+    return Terrain(np.concatenate(triangles), weights, corners, gray, inside, bare, np.concatenate(border))
 
 
 def _path(line: Line, distance: float) -> Path:

@@ -73,22 +73,8 @@ def read_camera(scene: Scene, depsgraph: Depsgraph, region_only: bool = False, b
     if region_only and scene.render.use_border and data.type != 'PANO':
         window, width, height = _region(scene.render, window, width, height)
     matrix = world_matrix(scene.camera, depsgraph).astype(np.float64)  # some versions give single precision
-    radius, focus = _lens(data, matrix, depsgraph)
-    camera = _placed(
-        Camera(
-            kind=data.type,
-            position=np.zeros(3),
-            frame=np.eye(3),
-            window=window,
-            near=float(data.clip_start),
-            far=float(data.clip_end),
-            width=width,
-            height=height,
-            lens_radius=radius,
-            focus=focus,
-        ),
-        matrix,
-    )
+    clip, lens = (float(data.clip_start), float(data.clip_end)), _lens(data, matrix, depsgraph)
+    camera = _placed(Camera(data.type, np.zeros(3), np.eye(3), window, *clip, width, height, *lens), matrix)
     if camera is None:
         raise SceneError(
             f'The camera "{name}" has zero scale, a scale above 100,000, or an invalid position; '
@@ -182,11 +168,9 @@ def _while_open(
         return _placed(camera, world_matrix(scene.camera, depsgraph).astype(np.float64), window)
 
     cameras = [other for other in at_moments(depsgraph, [scene.camera], frames, look) if other is not None]
-    moving = any(
-        not (np.allclose(o.position, camera.position, atol=1e-6) and np.allclose(o.frame, camera.frame, atol=1e-7))
-        for o in cameras
-    )
-    return tuple(cameras) if moving else ()
+    near = (np.allclose(o.position, camera.position, atol=1e-6) for o in cameras)
+    alike = (np.allclose(o.frame, camera.frame, atol=1e-7) for o in cameras)
+    return () if all(near) and all(alike) else tuple(cameras)
 
 
 def _stereo_views(scene: Scene, camera: Camera, depsgraph: Depsgraph) -> tuple[Camera, ...]:
@@ -232,8 +216,7 @@ def _by_suffix(scene: Scene, camera: Camera, depsgraph: Depsgraph) -> tuple[Came
     for other in (scene.objects.get(base + suffix) for suffix in suffixes):
         if other is None or other.type != 'CAMERA' or other == scene.camera:
             continue
-        matrix = world_matrix(other, depsgraph).astype(np.float64)
-        if (placed := _placed(camera, matrix)) is not None:
+        if (placed := _placed(camera, world_matrix(other, depsgraph).astype(np.float64))) is not None:
             cameras.append(replace(placed, window=camera.window))
     return tuple(cameras)
 

@@ -105,8 +105,7 @@ def _found(scene: bpy.types.Scene, kind: str) -> Species | Crown:
     """A species at the age of a kind; the crown itself of what is an asset, missing or broken."""
     asset = find_asset(scene, species_of(kind))
     if asset is not None:
-        size = asset.radius, asset.height, asset.polygons, asset.base, asset.leaves
-        return Crown(*size, 0.0, tuple(asset.color))
+        return Crown(asset.radius, asset.height, asset.polygons, asset.base, asset.leaves, 0.0, tuple(asset.color))
     try:
         return _grown(scene, kind)
     except SpeciesError:

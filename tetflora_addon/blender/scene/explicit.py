@@ -90,15 +90,10 @@ def _instancers_of_marked(rendered: set[bpy.types.Object], depsgraph: bpy.types.
     """Objects that show instances of marked ones."""
     if not any(may_instance(o) or len(o.particle_systems) for o in rendered):
         return set()
-    return {
-        instance.parent.original
-        for instance in depsgraph.object_instances
-        if instance.is_instance
-        and instance.object.original.tetflora.is_explicit
-        and not _unseen(instance)
-        and instance.parent.original in rendered
-        and not scatters(instance.parent.original)
-    }
+    instances = (instance for instance in depsgraph.object_instances if instance.is_instance)
+    marked = (one for one in instances if one.object.original.tetflora.is_explicit and not _unseen(one))
+    owners = {one.parent.original for one in marked}
+    return {owner for owner in owners if owner in rendered and not scatters(owner)}
 
 
 def _unseen(instance: bpy.types.DepsgraphObjectInstance) -> bool:

@@ -363,6 +363,13 @@ def read_sizes(obj: Object, parts: Sequence[Points]) -> Sizes | None:
     return Sizes(*rest, np.where(fit > 0.0, fit, 1.0))  # in the order of the names
 
 
+def size_columns(sizes: Sizes) -> dict[str, Floats]:
+    """Values of attributes, (n,) and (n, 3), by their names, from recorded sizes."""
+    numbers = sizes.height, sizes.diameter, sizes.width, sizes.base, sizes.dead
+    pairs = {OFFSET: sizes.offset, FIT: sizes.fit}
+    return dict(zip(NUMBERS, numbers, strict=True)) | {n: np.pad(of, ((0, 0), (0, 1))) for n, of in pairs.items()}
+
+
 def read_records(obj: Object, parts: Sequence[Points]) -> History | None:
     """Which records the points of a field are; None where they are plants.
 
@@ -378,10 +385,8 @@ def read_records(obj: Object, parts: Sequence[Points]) -> History | None:
     year = joined([_values(obj, part, YEAR) for part in parts], (0,))
     plant = joined([_values(obj, part, PLANT) for part in parts], (0,))
     refuse(obj, ~(np.abs(year) <= 1e6), f"{YEAR} that is not a year")
-    same = np.zeros(len(plant), bool)
-    same[1:] = plant[1:] == plant[:-1]
-    back = np.zeros(len(plant), bool)
-    back[1:] = same[1:] & (year[1:] <= year[:-1])
+    same = np.append(False, plant[1:] == plant[:-1])[: len(plant)]
+    back = same & np.append(False, year[1:] <= year[:-1])[: len(plant)]
     refuse(obj, back, f"{YEAR} that is not after that of the record before, of the same plant")
     return History(year, np.maximum.accumulate(np.where(same, 0, np.arange(len(plant)))))
 
@@ -395,16 +400,9 @@ def in_year(
     """
     a, b, part = records.chosen(now)
     scale = points.scale[:, a] + part * (points.scale[:, b] - points.scale[:, a])
-    age = points.age
-    chosen = replace(
-        points,
-        position=_between(points.position, a, b, part),
-        rotation=_turned(points.rotation, a, b, part),
-        scale=scale,
-        species=points.species[a],
-        seed=points.seed[a],
-        age=None if age is None else _between(age, a, b, part),
-    )
+    position, rotation = _between(points.position, a, b, part), _turned(points.rotation, a, b, part)
+    age = None if points.age is None else _between(points.age, a, b, part)
+    chosen = FieldPoints(points.kinds, position, rotation, scale, points.species[a], points.seed[a], age)
     if sizes is None:
         return chosen, None
     names = {column.name for column in fields(sizes)} - {"plant", "lives"}
@@ -508,11 +506,8 @@ def read_aged_field(
         place = (np.einsum("kij,nj->kni", world, position) + matrices[:, None, :3, 3]).reshape(-1, 3)
         frame, scale, sound = placed_frames(world, rotation, own_scale)
         sound &= np.isfinite(place.sum(axis=1))
-    refuse(
-        obj,
-        ~sound.reshape(len(matrices), -1).all(axis=0),
-        "zero scale, a scale above 100,000, or an invalid position or rotation",
-    )
+    odd = "zero scale, a scale above 100,000, or an invalid position or rotation"
+    refuse(obj, ~sound.reshape(len(matrices), -1).all(axis=0), odd)
     species = np.tile(points.species.astype(np.int32), len(matrices))
     ages = None if points.age is None else np.tile(points.age, len(matrices))
     seeds = Seeds(kinds, species, points.seeds(keys), place, frame, scale)

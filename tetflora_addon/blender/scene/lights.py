@@ -120,8 +120,7 @@ def read_world(scene: bpy.types.Scene) -> WorldLight:
     nodes = list(upstream(output.inputs["Surface"])) if output else []
     background = next((n for n in nodes if n.type == 'BACKGROUND'), None)
     if background is None:
-        note = "the world has no Background node and is treated as black" if nodes else ""
-        return WorldLight(BLACK, note=note)
+        return WorldLight(BLACK, note="the world has no Background node and is treated as black" if nodes else "")
     strength, notes = background.inputs["Strength"], []
     factor = 1.0 if strength.is_linked else float(strength.default_value)
     if strength.is_linked:

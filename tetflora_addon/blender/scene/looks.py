@@ -88,9 +88,8 @@ def _of_object(obj: bpy.types.Object) -> dict[str, Any]:
     look = {name: value for name in (*_FLAGS, *_OWN) if (value := getattr(obj, name))}
     if off := [ray for ray in RAYS if not getattr(obj, f"visible_{ray}", True)]:
         look["off"] = sorted(off)
-    linking = obj.light_linking
-    look |= {name: value.name_full for name in _LINKING if (value := getattr(linking, name)) is not None}
-    return look
+    linked = ((name, getattr(obj.light_linking, name)) for name in _LINKING)
+    return look | {name: value.name_full for name, value in linked if value is not None}
 
 
 def look_like(result: bpy.types.Object, like: bpy.types.Object | None, look: str | None = None) -> None:

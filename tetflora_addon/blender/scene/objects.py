@@ -249,8 +249,7 @@ def objects_within(collection: bpy.types.Collection) -> list[bpy.types.Object]:
 
     ``Collection.all_objects`` fills a cache that Blender 4.5 to 5.2 leaves stale at undo: reading it may then crash.
     """
-    homes = [collection, *collection.children_recursive]
-    return list(dict.fromkeys(obj for home in homes for obj in home.objects))
+    return list(dict.fromkeys(obj for home in (collection, *collection.children_recursive) for obj in home.objects))
 
 
 def in_parts(objects: bpy.types.bpy_prop_collection, few: int = 5000) -> Iterator[bpy.types.Object]:

@@ -125,9 +125,8 @@ class _Found:
         """The error where no plant is left."""
         if self.odd:
             return SceneError(_unknown(self.odd))
-        if (self.owners or self.copies) and not any(
-            o.tetflora.enabled for o in (*self.owners, *(c.owner for c in self.copies))
-        ):
+        every = (*self.owners, *(c.owner for c in self.copies))
+        if every and not any(o.tetflora.enabled for o in every):
             return NoPlantsError("All plants in the scene are disabled; enable some in the TetFlora tab of the sidebar")
         if fields := [o.name for o in self.owners if o.tetflora.is_field]:
             return NoPlantsError(

@@ -38,6 +38,7 @@ Item = tuple[str, str, str, str | int, int]
 _TRUSTED = 0.0 if bpy.app.background else 1.0
 _icons: dict[tuple[str, str], tuple[float, int]] = {}  # by species and season
 _kept: dict[tuple, list[Item]] = {}  # items by content: Blender keeps no copy of the strings of dynamic items
+_OVERRIDABLE = {"override": {'LIBRARY_OVERRIDABLE'}, "options": {'HIDDEN', 'ANIMATABLE'}}
 thumbnails = Pictures()
 register = thumbnails.register
 
@@ -157,12 +158,7 @@ class SpeciesChoice:
     #: Whether the enumeration has assets.
     takes_assets = True
 
-    species: string(
-        "Species",
-        "File name of the species in the catalog, without extension",
-        override={'LIBRARY_OVERRIDABLE'},
-        options={'HIDDEN', 'ANIMATABLE'},
-    )
+    species: string("Species", "File name of the species in the catalog, without extension", **_OVERRIDABLE)
     species_choice: once.choice(
         "Species",
         "Species from the catalog",

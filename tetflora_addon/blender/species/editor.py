@@ -226,6 +226,7 @@ def _text(key: str, name: str, description: str) -> Any:
 
 
 _THROUGH = "Fraction of the light scattered by a {} that passes through it"
+_QUALITY = {"min": QUALITY_LIMITS[0], "max": QUALITY_LIMITS[1], "soft_min": 0.02, "soft_max": 10.0, "precision": 3}
 
 
 class TetFloraSpeciesEditor(bpy.types.PropertyGroup, SpeciesChoice):
@@ -273,11 +274,7 @@ class TetFloraSpeciesEditor(bpy.types.PropertyGroup, SpeciesChoice):
         "Quality",
         "Polygon multiplier for this species: below 1 fewer, larger leaves; above 1 more, finer ones",
         1.0,
-        min=QUALITY_LIMITS[0],
-        max=QUALITY_LIMITS[1],
-        soft_min=0.02,
-        soft_max=10.0,
-        precision=3,
+        **_QUALITY,
     )
     habit: _number(
         "habit",
@@ -289,6 +286,7 @@ class TetFloraSpeciesEditor(bpy.types.PropertyGroup, SpeciesChoice):
 #: Added to a key's name for the property of a color's variation.
 VARIATION = "_variation"
 _VARIES = "Maximum deviation from the mean, in both directions"
+_COLOR = {"subtype": 'COLOR', "size": 3, "min": 0.0, "max": 1.0}
 
 
 def _label(name: str) -> str:
@@ -370,6 +368,9 @@ def _tone(name: str, key: Key, said: dict[str, Any], varies: bool = False) -> An
     """A color, or that of a mean and its variation."""
     part = () if key.kind == "rgb" else (int(varies),)
 
+    def read(editor: bpy.types.PropertyGroup) -> tuple[float, ...]:
+        return tuple(number_in(value_of(editor, name), *part, c) for c in range(3))
+
     def store(editor: bpy.types.PropertyGroup, value: Any) -> None:
         new = [rounded(c) for c in value]
         if part:
@@ -377,15 +378,7 @@ def _tone(name: str, key: Key, said: dict[str, Any], varies: bool = False) -> An
             new = [new if i in part else [rounded(number_in(old, i, c)) for c in range(3)] for i in (0, 1)]
         write(editor, name, new)
 
-    return FloatVectorProperty(
-        subtype='COLOR',
-        size=3,
-        min=0.0,
-        max=1.0,
-        get=lambda self: tuple(number_in(value_of(self, name), *part, c) for c in range(3)),
-        set=store,
-        **said,
-    )
+    return FloatVectorProperty(get=read, set=store, **_COLOR, **said)
 
 
 def _choice(name: str, key: Key, said: dict[str, Any]) -> Any:

@@ -139,8 +139,7 @@ def _edits(scene: bpy.types.Scene | None) -> Iterator[TetFloraSpeciesEdit | Page
     left: list[Page] = []
     for collection in getattr(bpy.data, "collections", ()):
         if PAGES in collection:
-            linked = collection.library is not None or collection.override_library is not None
-            if linked:
+            if collection.library is not None or collection.override_library is not None:
                 yield from pages_of(collection)
             else:
                 left += pages_of(collection)

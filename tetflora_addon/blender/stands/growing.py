@@ -37,21 +37,14 @@ _FINEST, _MOST = 1.0, 500_000
 _LEVEL = 0.4  # wetness of ground that is neither ridge nor valley
 
 
-@dataclass(frozen=True)
-class Soil:
-    """Climate and soil as the settings say, see `properties.TetFloraStand`; ``slope_max`` in radians."""
+def _stand_site(
+    ground: Terrain, climate: tuple[float, float], steepest: float, moisture: float, relief: float, fertility: float
+) -> tuple[StandSite, Floats]:
+    """The site of a stand, on which plants can be, and the place (2,) that its coordinates are counted from.
 
-    degree_days: float
-    coldest_month: float
-    moisture: float
-    relief: float
-    fertility: float
-    slope_max: float
-
-
-def _stand_site(ground: Terrain, soil: Soil) -> tuple[StandSite, Floats]:
-    """The site of a stand, on which plants can be, and the place (2,) that its coordinates are counted from."""
-    grid, wetness = _grid(ground.triangles, soil.relief)
+    By settings of `TetFloraStand`: degree days and coldest month; the largest slope, radians; and the soil.
+    """
+    grid, wetness = _grid(ground.triangles, relief)
     land = np.isfinite(grid.height)
     if not land.any():
         raise SceneError(
@@ -61,19 +54,17 @@ def _stand_site(ground: Terrain, soil: Soil) -> tuple[StandSite, Floats]:
     height = _whole(grid.height)
     sides = enumerate(height.shape)
     rise = [np.gradient(height, grid.cell, axis=a) if n > 1 else np.zeros_like(height) for a, n in sides]
-    plantable = land & (np.hypot(*rise) <= np.tan(min(soil.slope_max, 1.57)))
+    plantable = land & (np.hypot(*rise) <= np.tan(min(steepest, 1.57)))
     if not plantable.any():
         raise SceneError(
-            f"All of the ground is steeper than Max Slope ({np.degrees(soil.slope_max):.0f}°); raise Max Slope or use "
+            f"All of the ground is steeper than Max Slope ({np.degrees(steepest):.0f}°); raise Max Slope or use "
             "another mesh"
         )
     plantable = plantable * _masks(ground, grid)
     if not plantable.any():
         raise SceneError("Vertex Group, Areas, Paths or the biome's limits leave no ground for the stand; change them")
-    moisture = np.full(height.shape, soil.moisture) + soil.relief * (wetness - _LEVEL)
-    fertility, climate = np.full(height.shape, soil.fertility), (soil.degree_days, soil.coldest_month)
-    site = StandSite(0.0, 0.0, grid.cell, height, plantable, moisture, fertility, *climate)
-    return site, np.array([grid.west, grid.south])
+    soil = np.full(height.shape, moisture) + relief * (wetness - _LEVEL), np.full(height.shape, fertility)
+    return StandSite(0.0, 0.0, grid.cell, height, plantable, *soil, *climate), np.array([grid.west, grid.south])
 
 
 def _grid(triangles: Floats, relief: float) -> tuple[HeightGrid, Floats]:
@@ -196,7 +187,7 @@ def new_stand_steps(
     # The field comes first, with the settings that its plants will grow by: those of the scene may change meanwhile.
     nothing = np.zeros((0, 3)), np.zeros((0, 4)), *np.zeros((1, 0)), *np.zeros((2, 0), np.int32), ()
     field = fields.write_field(name, *nothing)
-    mesh, complete = field.data, False
+    mesh = field.data
     try:
         stand = field.tetflora.stand
         if fill is None:
@@ -207,17 +198,17 @@ def new_stand_steps(
             stand.grounds.add().object = obj
         grown = yield from _again_steps(data, field, grounds)
         stand = field.tetflora.stand
-        stand.is_grown, complete = True, True
+        stand.is_grown = True
         field.tetflora.stand_year = float(stand.years)
         field.display_type = 'BOUNDS'  # its points are plants of all years
         link_field(scene, field)
         return grown
-    finally:
-        if not complete:
-            if is_there(field):
-                bpy.data.objects.remove(field)
-            if is_there(mesh) and not mesh.users:
-                bpy.data.meshes.remove(mesh)
+    except BaseException:  # an error, or Esc
+        if is_there(field):
+            bpy.data.objects.remove(field)
+        if is_there(mesh) and not mesh.users:
+            bpy.data.meshes.remove(mesh)
+        raise
 
 
 @job("Growing the stand")
@@ -242,15 +233,14 @@ def _again_steps(data: JobData, field: Object, grounds: list[Object]) -> Job[Gro
         raise SceneError(f'"{field.name}" has no species; add one to the list')
     members = [StandSpecies(species_for(scene, e.species), e.planted, e.incoming_seeds) for e in entries]
     names = [entry.species for entry in entries]
-    soil = Soil(**{name: getattr(stand, name) for name in Soil.__dataclass_fields__})
+    climate, soil = (stand.degree_days, stand.coldest_month), (stand.moisture, stand.relief, stand.fertility)
     settings = StandSettings(**{name: getattr(stand, name) for name in StandSettings.__dataclass_fields__})
     ground = read_ground(grounds, depsgraph, **{name: getattr(stand, name) for name in _MASKS})
     ground = zoned(depsgraph, stand, grounds, ground)
     stood_on = forms_of(grounds, lambda obj: ground_form(obj, depsgraph))
-    site, corner = yield from call_in_thread(progress, _stand_site, ground, soil)
+    site, corner = yield from call_in_thread(progress, _stand_site, ground, climate, stand.slope_max, *soil)
     try:
-        growing = steps_in_thread(grow(site, members, settings), Progress(0.0, "Growing the stand"))
-        with closing(growing) as steps:
+        with closing(steps_in_thread(grow(site, members, settings), Progress(0.0, "Growing the stand"))) as steps:
             records = yield from part_of(steps, _GROWING[0], sum(_GROWING))
     except TetFloraError as error:
         raise SceneError(f'"{field.name}": {error}') from None
@@ -311,23 +301,19 @@ def _columns(records: Records, site: StandSite, corner: Floats) -> tuple[Floats,
 
 def _replace(field: Object, names: list[str], position: Floats, rotation: Floats, records: Records) -> None:
     """Give a field the records in place of its points."""
-    given = position, rotation, np.ones(len(records)), records.species, records.seed
-    other = fields.write_field(NAME, *given, names)
-    sizes = (records.height, records.diameter, records.crown_width, records.crown_base, records.dead, records.offset)
+    other = fields.write_field(NAME, position, rotation, np.ones(len(records)), records.species, records.seed, names)
+    numbers = records.height, records.diameter, records.crown_width, records.crown_base, records.dead
+    columns = dict(zip(fields.NUMBERS, numbers, strict=True)) | {
+        fields.OFFSET: np.pad(records.offset, ((0, 0), (0, 1)))
+    }
     field.matrix_world = other.matrix_world.copy()
-    _hand_over(other, field, {**_size_columns(*sizes), fields.YEAR: records.year, fields.PLANT: records.plant})
+    _hand_over(other, field, {**columns, fields.YEAR: records.year, fields.PLANT: records.plant})
     group = field.tetflora
     forms = {entry.species: entry.skeleton for entry in group.field_species}
     group.field_species.clear()
     for name in names:
         entry = group.field_species.add()
         entry.species, entry.skeleton = name, forms.get(name)
-
-
-def _size_columns(*sizes: NDArray) -> dict[str, NDArray]:
-    """Attributes of height, diameter, width and base of the crown, share that is dead, and offset (n, 2) of plants."""
-    names = ("tf_height", "tf_diameter", "tf_crown_width", "tf_crown_base", "tf_dead", fields.OFFSET)
-    return {**dict(zip(names, sizes, strict=True)), fields.OFFSET: np.pad(sizes[-1], ((0, 0), (0, 1)))}
 
 
 def _hand_over(other: Object, field: Object, columns: dict[str, NDArray]) -> None:
@@ -372,11 +358,8 @@ def _stored(sizes: Sizes | None) -> dict[str, NDArray]:
     """Attributes of sizes that say anything."""
     if sizes is None:
         return {}
-    columns = _size_columns(sizes.height, sizes.diameter, sizes.width, sizes.base, sizes.dead, sizes.offset)
-    columns = {name: column for name, column in columns.items() if column.any()}
-    if (sizes.fit != 1.0).any():
-        columns[fields.FIT] = np.pad(sizes.fit, ((0, 0), (0, 1)))
-    return columns
+    silent = fields.FIT if (sizes.fit == 1.0).all() else ""
+    return {name: of for name, of in fields.size_columns(sizes).items() if of.any() and name != silent}
 
 
 def animate(field: Object, first: int, last: int) -> tuple[float, float]:

@@ -14,6 +14,10 @@ from ..species.catalog import SpeciesChoice, gallery_of
 
 _RULES = properties_of(Rules, options=set())
 _FACTOR = {"min": 0.0, "max": 1.0, "subtype": 'FACTOR', "options": set()}
+_AMONG = "Share of this species among the {}, relative to the others"
+_SHARE = {**within(0.0, 10.0, 1e6), **FIXED}
+_WARMTH = {**within(0.0, 6000.0, 12_000.0), "step": 10_000, "precision": 0, **FIXED}
+_COLD = {"min": -80.0, "soft_min": -30.0, "soft_max": 20.0, "max": 40.0, "step": 100, "precision": 1, **FIXED}
 
 
 class TetFloraStandEntry(bpy.types.PropertyGroup, SpeciesChoice):
@@ -21,20 +25,8 @@ class TetFloraStandEntry(bpy.types.PropertyGroup, SpeciesChoice):
 
     takes_assets = False  # they do not grow
 
-    planted: real(
-        "Planted",
-        "Share of this species among the plants that are planted at the beginning, relative to the others",
-        1.0,
-        **within(0.0, 10.0, 1e6),
-        **FIXED,
-    )
-    incoming_seeds: real(
-        "Share of Seeds",
-        "Share of this species among the seeds that arrive from outside, relative to the others",
-        1.0,
-        **within(0.0, 10.0, 1e6),
-        **FIXED,
-    )
+    planted: real("Planted", _AMONG.format("plants that are planted at the beginning"), 1.0, **_SHARE)
+    incoming_seeds: real("Share of Seeds", _AMONG.format("seeds that arrive from outside"), 1.0, **_SHARE)
 
 
 class TetFloraStand(bpy.types.PropertyGroup, settings_in(StandSettings, options=set()), AroundPaths):
@@ -60,22 +52,10 @@ class TetFloraStand(bpy.types.PropertyGroup, settings_in(StandSettings, options=
         "Sum of the daily mean temperatures above 5 °C in a year, where altitude is 0; it is colder above. About "
         "900 in Lapland, 1,700 in central Europe, 3,500 on the Mediterranean",
         1700.0,
-        **within(0.0, 6000.0, 12_000.0),
-        step=10_000,
-        precision=0,
-        **FIXED,
+        **_WARMTH,
     )
     coldest_month: real(
-        "Coldest Month",
-        "Mean temperature of the coldest month, in °C, where altitude is 0",
-        -1.0,
-        min=-80.0,
-        soft_min=-30.0,
-        soft_max=20.0,
-        max=40.0,
-        step=100,
-        precision=1,
-        **FIXED,
+        "Coldest Month", "Mean temperature of the coldest month, in °C, where altitude is 0", -1.0, **_COLD
     )
     moisture: real("Moisture", "Moisture of level soil: 0 is dry, 0.5 fresh, 1 wet", 0.5, **_FACTOR)
     relief: real(
