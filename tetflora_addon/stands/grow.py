@@ -214,7 +214,7 @@ _STANDS, _LIES, _DEAD_DIAMETER, _BREAKS = (2.0, 22.0), (8.0, 40.0), 0.4, 0.1
 def grown(
     plants: Plants, crowns: Crowns, taken: NDArray, light: LightGrid, traits: StandTraits, block: slice
 ) -> Plants:
-    """A block of plants a year later, by the crowns of all and the light that these take, m²."""
+    """A block of plants a year later, by the crowns of all (n,) and the light (n,) that each of these takes, m²."""
     one = plants.take(block)
     x, y, radius, base, height = (v[block] for v in (crowns.x, crowns.y, crowns.radius, crowns.base, crowns.height))
     species, taken = one.species, taken[block]

@@ -9,7 +9,7 @@ import sys
 import time
 import traceback
 from collections.abc import Callable
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
 
 import blf
@@ -250,9 +250,9 @@ def _draw_levels(preview: Preview, settings: TetFloraPreview, space: bpy.types.S
     gpu.state.depth_mask_set(False)  # clouds hide nothing
     if settings.projected:
         region, name = space.region_3d, f"projected {space.as_pointer()}"
-        view = tuple(np.array(region.view_matrix).ravel().round(7)), region.is_perspective
-        camera = view_camera(region, space.clip_start, origin)
-        _draw(_kept(preview, name, (*shown, *view), lambda: _made_in_time(preview, level, forms, camera)), origin)
+        key = (*shown, *np.array(region.view_matrix).ravel().round(7), region.is_perspective)
+        camera = partial(view_camera, region, space.clip_start, origin)  # asked for where the view has changed
+        _draw(_kept(preview, name, key, lambda: _made_in_time(preview, level, forms, camera())), origin)
     if settings.wires:
         overlay = _kept(preview, "wires", (*shown, settings.color), lambda: wires(levels, level, settings.color, forms))
         _draw(overlay, origin)
