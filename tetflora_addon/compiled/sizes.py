@@ -19,13 +19,13 @@ from ..growth.crown_effects import MOST_LEANING, are_stools, bare_part, child_fa
 from ..growth.foliage import envelope_reach, leaf_keys, leaf_places, place_leaves, settled
 from ..growth.growth import branch_counts, chosen_children, leaf_counts, living_nodes, open_branches, trunks
 from ..growth.hashing import Draw, uniform
-from ..growth.rows import FADES, FORK, LATERAL, lengths
+from ..growth.rows import FORK, LATERAL, lengths
 from ..growth.seeds import BASE, LEAST, MOST, PLAIN, WIDTH, Branches, Seeds
 from ..leaves.levels import level_errors
 from ..leaves.models import LeafModel
 from ..parallel import each_on_all_cores
 from ..species.members import expected_polygons
-from ..species.species import Species, faded
+from ..species.species import Species
 from .flora import Flora, compile_species
 from .samples import Points
 
@@ -463,13 +463,10 @@ def _mean_tips(rows: Table, stems: Branches, lines: Axes) -> tuple[Integers, Int
     grown = living_nodes(rows, stems, LATERAL)
     if grown is not None:
         number, _, extra = grown.chosen(owner, index, whorl)
-        place, among, described = grown.places(owner, number // whorl, np.full(len(owner), 0.5), extra)
+        place, among, fading = grown.places(owner, number // whorl, np.full(len(owner), 0.5), extra)
         on = grown.on[owner]
         least = whorl / np.maximum(counts, 1)[owner]  # the lowest may be anywhere in their node
         t, part = np.where(on, place, t), np.where(on, np.maximum(among, least), part)
-        first, last = rows["fraction"][row, LATERAL].T
-        described = first[owner] + (last - first)[owner] * described
-        fading = faded(described, rows["growing"][row, LATERAL, FADES][owner], extra)
     low, high = lateral_fractions(rows, row, base).T
     fraction = low[owner] + (high - low)[owner] * part
     angle = rows["angle"][child, 0][owner]

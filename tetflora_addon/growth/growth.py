@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from ..arrays import Arrays, Floats, Integers, Integers32, Keys, Table, by_component, columns, dot, spread
 from ..species.members import dead_vigor
-from ..species.species import NodeLaw, faded
+from ..species.species import NodeLaw
 from . import crown_effects
 from . import rows as table
 from .axes import Axes, axes, profile
@@ -160,7 +160,7 @@ def living_nodes(rows: Table, branches: Branches, sort: int) -> Grown | None:
     wanted = varied(rows["count"][row, sort], key, _COUNT[sort]) * fullness(rows, branches, wood=True) / whorl
     draw = np.zeros(len(row)) if sort == DEAD else signed(key, _START[sort])
     mean, variation = rows["start"][row, sort].T
-    start = described = mean + variation * draw
+    start = mean + variation * draw
     last = nodes[:, table.UNTIL]
     if crown_effects.are_shaped(rows, branches):
         base = branches.crown[:, BASE]
@@ -177,6 +177,7 @@ def living_nodes(rows: Table, branches: Branches, sort: int) -> Grown | None:
     rounded = (1 - settled) * whole + settled * np.floor(whole + chance)
     density = np.where(whole > 0, rounded / np.maximum(whole, 1e-12), 1.0), nodes[:, table.EXTRA]
     ends = np.stack([law.number_at(place * now) for place in (start, nodes[:, table.FRESH], last)])
+    extent, fades = np.stack([start, np.maximum(last, start)]), nodes[:, table.FADES :].T
     ends = np.maximum(ends, ends[0])
 
     def passed(place: Floats, begin: int) -> Integers:
@@ -188,8 +189,7 @@ def living_nodes(rows: Table, branches: Branches, sort: int) -> Grown | None:
     stay = [passed(np.where(place > 0, place * density[0], place), 0) for place in (ends[0], ends[2])]
     extra = [passed(place * density[1], table.EXTRA_PATH) for place in ends[1:]]
     first, last = np.stack([stay, extra], axis=1)
-    described = law.number_at(described * now)
-    return Grown(on, first, np.maximum(last - first, 0), now, law, ends, np.stack(density), described)
+    return Grown(on, first, np.maximum(last - first, 0), now, law, np.stack(density), extent, fades)
 
 
 def _started(rows: Table, branches: Branches, sort: int) -> Floats:
@@ -256,15 +256,12 @@ def chosen_children(
                 start = np.maximum(start, crown_effects.bare_part(rows, parent.row, base))
         t = start + (end - start) * fraction
         if grown is not None:
-            along, part, described = grown.places(owner, node, 0.5 + _PLACE_JITTER * place, extra)
+            along, part, fading = grown.places(owner, node, 0.5 + _PLACE_JITTER * place, extra)
             on = grown.on[owner]
             t, fraction = np.where(on, along, t), np.where(on, part, fraction)
         among = rows["fraction"][parent.row, sort]
         low, high = (crown_effects.lateral_fractions(rows, parent.row, base) if shaped and sort == LATERAL else among).T
         fraction = low + (high - low) * fraction
-        if grown is not None:
-            first, last = among.T
-            fading = faded(first + (last - first) * described, rows["growing"][parent.row, sort, table.FADES], extra)
     position, frame = lines.at(owner, t)
     sky = lines.sky_at(owner, t)
     angle_base, angle_spread = rows["angle"][row].T

@@ -47,7 +47,7 @@ from ..species.species import (
 )
 from .hashing import signed
 
-NOW, BEGIN, END, UNTIL, POWER, WHOLE, BELOW, FRESH, EXTRA, VARIES, FADES = range(11)
+NOW, BEGIN, END, UNTIL, POWER, WHOLE, BELOW, FRESH, EXTRA, VARIES, FADES, LASTS = range(12)
 """Columns of ``growing``."""
 _GAUSS, _WEIGHTS = np.polynomial.legendre.leggauss(5) / np.array([[1], [2]])
 
@@ -67,9 +67,9 @@ def _grow_children(
     low, full = cuts[p], cuts[p + 1] - cuts[p]
     high = now if p + 2 == len(cuts) else min(cuts[p + 1], now)
     here = high - low
-    first, top = (float(law.number_at(place * now)) for place in (start[0], nodes.until))
-    last = first + nodes.kept * (top - first)
-    fraction = (np.clip(law.number_at([low, high]), first, last) - first) / max(top - first, 1e-9)
+    foot, fresh, highest = nodes.ends(law, start[0], now)
+    fraction = (np.clip([low, high], foot, highest) - foot) / max(nodes.until * now - foot, 1e-9)
+    fades = (fresh - low) / here, (highest - fresh) / here
     begin = float(np.clip((nodes.begin - low) / full, 0, 1))
     end = float(np.clip((nodes.end - low) / full, begin, 1))
     whole = law.whole * (full * (end - begin) / (nodes.end - nodes.begin))
@@ -77,7 +77,7 @@ def _grow_children(
     power = nodes.power if p == 0 else 1.0
     inside = low < start[0] * now < high
     mean = float(np.clip((start[0] * now - low) / here, 0, 0.999))
-    fresh, until = np.clip((law.place_of([last - nodes.fresh * (last - first), last]) - low) / here, mean, 1)
+    fresh, until = np.clip((np.array([fresh, highest]) - low) / here, mean, 1)
     variation = min(start[1] * now / here, mean, 0.999 - mean) if inside else 0.0
     starts = mean + variation * _GAUSS  # numbers are not linear in the start, so that their mean is not that of it
     varies = start[1] / start[0] if start[0] > 0 else 0.0
@@ -90,7 +90,7 @@ def _grow_children(
     if alive > 0:
         row["growing"][sort] = (
             *(here / full, begin, end, until, power, whole / alive, below / alive),
-            *(fresh, nodes.extra, varies, nodes.kept * (1 - nodes.fresh)),
+            *(fresh, nodes.extra, varies, *fades),
         )
 
 
@@ -138,20 +138,20 @@ def spread_children(
     law = NodeLaw(nodes[BEGIN], nodes[END], nodes[POWER], nodes[WHOLE] * number, nodes[BELOW] * number)
     start = row["start"][sort, 0]
     until = max(nodes[UNTIL], dead) if nodes[UNTIL] > start else nodes[UNTIL]
-    base, lowest, fresh, tip = law.number_at(np.array([start, max(start, bare), nodes[FRESH], until]) * nodes[NOW])
-    node, weight, extra = some_nodes((lowest, max(fresh, lowest), tip), nodes[EXTRA])
-    (low, high), described = row["fraction"][sort] if among is None else among, row["fraction"][sort]
-    fraction = low + (high - low) * (node - lowest) / max(tip - lowest, 1e-9)
-    own_fraction = described[0] + (described[1] - described[0]) * (node - base) / max(tip - base, 1e-9)
-    return np.clip(law.place_of(node) / nodes[NOW], 0, 1), fraction, weight, faded(own_fraction, nodes[FADES], extra)
+    foot = max(start, bare)
+    place, weight, extra = some_nodes(law, np.array([foot, max(nodes[FRESH], foot), until]) * nodes[NOW], nodes[EXTRA])
+    t = np.clip(place / nodes[NOW], 0, 1)
+    low, high = row["fraction"][sort] if among is None else among
+    fraction = low + (high - low) * (t - foot) / max(until - foot, 1e-9)
+    return t, fraction, weight, faded(t, *nodes[FADES:], extra)
 
 
 def lengths(rows: Table, row: Integers, fraction: Floats) -> Floats:
     """Length ratios (n,) of laterals at fractions (n,) of those of their parents, which are of rows (n,)."""
     out = crown_ratio(rows["crown"][row], 1 - fraction)
     ramps = rows["ramps"][row]
-    if ramps.any() or rows["conical"][row].any():
-        out = out * shortened(fraction, rows["conical"][row], *ramps.T)
+    if ramps.any():
+        out = out * shortened(fraction, *ramps.T)
     return out
 
 
@@ -190,9 +190,9 @@ class Grown:
     number: Integers
     now: Floats  # (n,): length over that when full-grown
     law: NodeLaw  # of (n,) float64
-    ends: Floats  # (3, n): where nodes begin, where those begin that live for a while, and where all end, in nodes
     density: Floats  # (2, n): nodes above the begin, and nodes that live for a while, over those of the law
-    described: Floats  # (n,): where nodes would begin without the crown shapes of plants
+    ends: Floats  # (2, n): where nodes begin and end, fractions of the present length
+    fades: Floats  # (2, n): where those begin that live for a while, and on how long a part they are
 
     def chosen(self, owner: Integers, index: Integers, whorl: Integers) -> tuple[Integers, Integers, Mask]:
         """Index that is theirs for life, where child numbers begin, and which live for a while (m,), of children (m,).
@@ -206,14 +206,14 @@ class Grown:
         return node * whorl + within, np.where(extra, EXTRA_PATH, 0), extra
 
     def places(self, owner: Integers, node: Integers, within: Floats, extra: Mask) -> tuple[Floats, Floats, Floats]:
-        """Fractions (m,) for nodes (m,) of branches (m,): of the branch, of its children, and of those as described."""
+        """Fractions (m,) of branches (m,) and of their children at nodes (m,), and factors (m,) on lengths."""
         number = node + within
         dense = np.where(extra, self.density[1][owner], np.where(number >= 0, self.density[0][owner], 1.0))
         number = number / np.maximum(dense, 1e-9)
-        t = NodeLaw(*(one[owner] for one in self.law)).place_of(number) / self.now[owner]
-        high = self.ends[2][owner]
-        parts = [(number - low) / np.maximum(high - low, 1e-9) for low in (self.ends[0][owner], self.described[owner])]
-        return np.clip(t, 0, 1), np.clip(parts[0], 0, 1), np.clip(parts[1], 0, 1)
+        t = np.clip(NodeLaw(*(one[owner] for one in self.law)).place_of(number) / self.now[owner], 0, 1)
+        begin, end = self.ends[:, owner]
+        part = np.clip((t - begin) / np.maximum(end - begin, 1e-9), 0, 1)
+        return t, part, faded(t, *self.fades[:, owner], extra)
 
 
 MAX_SEGMENTS = 24
@@ -315,7 +315,7 @@ ROW_DTYPE = np.dtype(
     + [("envelope", np.int64), ("envelope_radius", np.float64), ("inclination", np.int64)]
     + [("next", np.int32, (4,)), ("count", np.float64, (4, 2)), ("start", np.float64, (4, 2))]
     + [("fraction", np.float64, (4, 2)), ("part", np.float64, (2,))]
-    + [("growing", np.float64, (4, 11)), ("settled", np.float64), ("conical", np.float64)]
+    + [("growing", np.float64, (4, 12)), ("settled", np.float64)]
     + [("ramps", np.float64, (2,)), ("least", np.float64)]
     + [("nominal", np.float64), ("pipe_radius", np.float64), ("fork_power", np.float64)]
     + [("continues", np.bool_), ("outward", np.bool_), ("tropic", np.bool_), ("gradient", np.bool_)]
@@ -336,8 +336,8 @@ stems beyond a fork; ``outward`` branches whose own axis leads from the inside o
 sub-plants whose shape depends on how they stand to the sky; ``gradient`` leaves whose size or color differs between
 inside and outside, or old and young; ``sunlit`` leaves that turn to the sky otherwise outside than inside; ``exact``
 plants that are all the same; ``dead`` branches that are broken off or bare. Of axes that are not full-grown ``growing``
-says where children of each sort are, ``settled``, ``conical`` and ``ramps`` are those of
-`species.PartGrown`, and ``least`` is the vigor below which a branch is new, or about to die.
+says where children of each sort are, ``settled`` and ``ramps`` are those of `species.PartGrown`, and ``least`` is the
+vigor below which a branch is new, or about to die.
 
 A plant whose form is drawn by hand begins with a ``phantom`` row: a branch without wood, whose children are the
 ``drawn`` rows from the first to before the last of ``drawn_rows``. Each of these is one branch with ``knots`` (meters,
@@ -483,7 +483,7 @@ def _row(order: Order, species: int, number: int) -> np.void:
 def _grow(row: np.void, order: Order, p: int, dead: Dead | None) -> None:
     """Where children of a part are, number ``p`` of an order that is not full-grown."""
     growing, cuts = order.growing, whole_cuts(order)
-    row["settled"], row["conical"], row["ramps"] = growing.settled, growing.conical, growing.ramps
+    row["settled"], row["ramps"] = growing.settled, growing.ramps
     sorts = [(LATERAL, growing.laterals, order.branches, order.branch_start)]
     sorts += [(SPUR, growing.spurs, order.spurs, order.spur_start)]
     if dead is not None and row["next"][DEAD] >= 0:

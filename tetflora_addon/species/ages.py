@@ -21,7 +21,7 @@ from typing import Any
 import numpy as np
 
 from .catalog import LENGTH_HIGH, ORDER_KEYS
-from .members import expected_leaf_area
+from .members import bisected, expected_leaf_area
 from .skeletons import Skeleton
 from .species import Ages, Color, Dead, NodeLaw, Nodes, Order, PartGrown, Range, Species, rounded_least
 
@@ -103,12 +103,12 @@ _TWIGS = 0.25
 _LONGEST = 0.6  # longest branches in lengths of their parents, where the description has shorter ones
 #: Girth of branches follows length as this power, that of stools the stems'; radius of the thinnest tips, meters.
 _STOUT, _STOOL, _TIP = 1.15, 0.7, 0.0012
-#: In a small plant, the topmost limbs are shorter than the crown's shape has them, the shoots of this year bare of
-#: branches, and trunks even cones.
-_SHORTER_TOP, _LEADER, _EVEN = 0.5, 0.75, 1.3
-_FULLER = 2.0  # leaves on twigs of old trees over those when full-grown, at most
-#: Branches that live for a while, for each of the others, on stems and on limbs; steps in which their number is found.
-_EXTRA, _STEPS = (3.0, 1.5), 14
+#: In a small plant, the shoots of this year are bare of branches, and trunks even cones.
+_LEADER, _EVEN = 0.75, 1.3
+_FULLER = 1.5, 2.0  # leaves on twigs of young and of old trees over those when full-grown, at most
+#: Branches that live for a while, for each of the others, at most; and ages over that when full-grown, at the barest
+#: of which they are on all of the crown; and steps in which numbers are found.
+_EXTRA, _BAREST, _STEPS = 3.0, (0.1, 0.2, 0.3, 0.45), 14
 _SMALL = 3.0  # meters of height up to which crowns have not closed
 _LEAFY = 4.0  # of the length of a leafy twig: what is longer than so many bears no leaves itself
 #: A leaf is at most this fraction of the plant's height, and a seedling has so many.
@@ -173,11 +173,18 @@ def with_age(species: Species, years: float) -> Species:
     return replace(other, aged=(species, years))
 
 
+@lru_cache(maxsize=256)
+def _extra(species: Species) -> float:
+    """Branches of stems and limbs that live for a while, for each of the others, where all of the crown has them."""
+    ages = ages_of(species)
+    young = [_Aged(species, ages, part * ages.full, 1.0, _FULLER[0]) for part in _BAREST]
+    return max(one.found("extra", _EXTRA) for one in young)
+
+
 def _scaled(species: Species, factor: float) -> Species:
     """A species of another size and the same form."""
-    trunk, *rest = species.orders
+    trunk, *rest = (replace(order, leaf_size=order.leaf_size.scaled(factor)) for order in species.orders)
     orders = (replace(trunk, length=trunk.length.scaled(factor)), *rest)
-    orders = tuple(replace(order, leaf_size=order.leaf_size.scaled(factor)) for order in orders)
     spur, bud, form = species.spur, species.bud, species.skeleton
     if spur is not None:
         spur = replace(spur, length=spur.length.scaled(factor), leaf_size=spur.leaf_size.scaled(factor))
@@ -202,7 +209,7 @@ class _Aged:
     full-grown. ``fresh`` is the fraction of branches with more that live a while, ``thin`` a factor on leaf numbers.
     """
 
-    def __init__(self, species: Species, ages: Ages, years: float) -> None:
+    def __init__(self, species: Species, ages: Ages, years: float, fresh: float = 0.0, thin: float = 1.0) -> None:
         self.one, self.ages, self.years = species, ages, years
         self.stem, self.last = _stem(species), len(species.orders) - 1
         self.whole = np.cumprod([order.length.mean for order in species.orders]).tolist()
@@ -214,7 +221,7 @@ class _Aged:
         self.youth = float(np.clip((1 - self.now[self.stem]) / 0.5, 0, 1))
         self.declined = ages.declined(years)
         self.dead = max(years - ages.lifespan, 1e-6) if years >= ages.lifespan else 0.0
-        self.fresh, self.thin = 0.0, 1.0
+        self.extra, self.fresh, self.thin = 0.0, fresh, thin
 
     def _lengths(self, years: float) -> list[float]:
         """Lengths by order over those when full-grown."""
@@ -234,20 +241,30 @@ class _Aged:
         out = self._made()
         if self.stem + 1 >= self.last or self.dead:
             return out
+        grown = self.now[self.stem] >= 1
+        self.thin = min(self.wanted / max(expected_leaf_area(out), 1e-9), _FULLER[grown])
+        if self.thin == _FULLER[0] and not grown:
+            self.extra = _extra(self.one)
+            self.fresh = self.found("fresh", 1.0)
+        return self._made()
+
+    @property
+    def wanted(self) -> float:
+        """Leaf area, as `expected_leaf_area` has it."""
         # Leaves follow the trunk that supplies them (leaf areas of McPherson, van Doorn and Peper, 2016): young trees
         # have more branches on a meter than will stay where limbs bear less, and fewer leaves where these bear more.
-        leaves = self.ages.diameters(self.years) ** self.ages.leaves * self.leafless
+        leaves = self.ages.diameters(self.years) ** self.ages.leaves * self.leafless / self.thin
         closed = max(self.height / _SMALL, self.ages.heights(self.years))  # low shrubs' crowns at their full height
-        wanted = expected_leaf_area(self.one) * leaves * min(closed, 1.0)
-        self.thin = min(wanted / max(expected_leaf_area(out), 1e-9), _FULLER)
-        if self.thin < 1 or self.now[self.stem] >= 1:
-            return self._made()
-        self.thin = 1.0
-        low, high = 0.0, 1.0
-        for _ in range(_STEPS):
-            self.fresh = (low + high) / 2
-            low, high = (low, self.fresh) if expected_leaf_area(self._made()) > wanted else (self.fresh, high)
-        return self._made()
+        return expected_leaf_area(self.one) * leaves * min(closed, 1.0)
+
+    def found(self, name: str, most: float) -> float:
+        """The value of a number with which leaves are as wanted, or the most that it may be."""
+
+        def area(value: float) -> float:
+            setattr(self, name, value)
+            return expected_leaf_area(self._made())
+
+        return bisected(area, self.wanted, most, _STEPS)
 
     def _made(self) -> Species:
         one = self.one
@@ -279,13 +296,12 @@ class _Aged:
         order, now = self.one.orders[o], self.now[o]
         stool, size = o < self.stem, 1.0 if o < self.stem else now
         numbers, nodes = zip(*self._sorts(o), strict=True)
-        conical = _SHORTER_TOP * float(np.clip(1 - now, 0, 1)) if o == self.stem else 0.0
         ramp = min(_RAMP / max(order.branches.mean * numbers[0], 1e-9), 0.35) * min(abs(size - 1) / _NEAR, 1)
         settled = 1.0 if o <= self.stem else float(np.clip(1 - abs(now - 1) / _NEAR, 0, 1))
         changes: dict[str, Any] = {
             "length": order.length.scaled(now if o == 0 else now / self.now[o - 1]),
             "thickness": self._thickness(o),
-            "growing": PartGrown(size, settled, *nodes, conical, (ramp, ramp)),
+            "growing": PartGrown(size, settled, *nodes, (ramp, ramp)),
             "branches": order.branches.scaled(numbers[0]),
             "spurs": order.spurs.scaled(numbers[1]),
         }
@@ -335,7 +351,7 @@ class _Aged:
         if self.one.spur is not None and self.one.spur.leaf_kind == "leaf":
             flowers = 1.0
         tier = o - self.stem
-        extra = _EXTRA[tier] if 0 <= tier < len(_EXTRA) and order.branch_start.mean < _ROSETTE else 0.0
+        extra = self.extra if 0 <= tier < 2 and order.branch_start.mean < _ROSETTE else 0.0
         laterals = self._nodes(o, order.branch_start.mean, more, until, self._kept(o), extra)
         number, spurs = self._nodes(o, order.spur_start.mean)
         return [laterals, (0.0 if self.dead else flowers * number, spurs), self._dead_nodes(o)]
@@ -369,8 +385,7 @@ class _Aged:
             return 1.0
         if o <= self.stem:
             tier = 2
-        left = 1 - self.declined * (1 - _LEFT[tier])
-        return left * max(1 - self.dead / _FALLEN[tier], 0.0)
+        return (1 - self.declined * (1 - _LEFT[tier])) * max(1 - self.dead / _FALLEN[tier], 0.0)
 
     def _thickness(self, o: int) -> Range:
         order = self.one.orders[o]

@@ -5,6 +5,7 @@
 The same numbers as a compiled species holds, for readers of files and levels of detail, before anything is compiled.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
 
@@ -53,6 +54,15 @@ def expected_members(species: Species) -> Members:
     return Members(branches, segments, leaves, spurs, spurs * on_spur, tuple(dead))
 
 
+def bisected(count: Callable[[float], float], target: float, most: float, steps: int) -> float:
+    """Number up to ``most`` at which a count that grows with it reaches the target, or an end of the interval."""
+    low, high = 0.0, most
+    for _ in range(steps):
+        middle = (low + high) / 2
+        low, high = (middle, high) if count(middle) < target else (low, middle)
+    return (low + high) / 2
+
+
 def expected_leaf_area(species: Species) -> float:
     """Expected area of the leaves of a plant, but those of short shoots, in that of a leaf of unit length."""
     leaves = expected_members(species).leaves
@@ -67,12 +77,11 @@ def _laterals(order: Order) -> tuple[Floats, Floats, Floats | float]:
     if part is not None and order.branches.mean > 0:
         nodes = part.laterals
         law = nodes.law(order.branches.mean)
-        base, tip = law.number_at(np.array([start, nodes.until]) * part.now)
-        tip = base + nodes.kept * (tip - base)
-        node, weight, extra = some_nodes((base, tip - nodes.fresh * (tip - base), tip), nodes.extra)
-        place = np.clip(law.place_of(node) / part.now, 0, 1)
-        fraction = nodes.kept * (node - base) / max(tip - base, 1e-9)
-        short = faded(fraction, nodes.kept * (1 - nodes.fresh), extra) * shortened(fraction, part.conical, *part.ramps)
+        _, fresh, end = ends = nodes.ends(law, start, part.now)
+        place, weight, extra = some_nodes(law, ends, nodes.extra)
+        short, place = faded(place, fresh, end - fresh, extra), np.clip(place / part.now, 0, 1)
+        fraction = (place - start) / max(nodes.until - start, 1e-9)
+        short = short * shortened(fraction, *part.ramps)
     return place, short * crown_ratio(order.crown, 1 - fraction), weight
 
 
@@ -80,8 +89,7 @@ def least_length(order: Order) -> float:
     """Shortest length ratio of laterals of an order that is still growing, but for new ones; 0 if it is full-grown."""
     if order.growing is None:
         return 0.0
-    fraction = np.linspace(0, 1, 65)
-    return float((crown_ratio(order.crown, 1 - fraction) * (1 - order.growing.conical * fraction)).min())
+    return float(crown_ratio(order.crown, np.linspace(0, 1, 65)).min())
 
 
 @lru_cache(maxsize=256)

@@ -10,7 +10,6 @@ earlier than plants lose members; bends are adjusted so that the tips of branche
 """
 
 import math
-from collections.abc import Callable
 from dataclasses import replace
 from functools import lru_cache
 
@@ -19,7 +18,7 @@ import numpy as np
 from ..errors import SpeciesError
 from ..leaves.models import LeafModel
 from .catalog import MAX_POLYGONS, ORDER_KEYS
-from .members import Members, expected_members, expected_polygons
+from .members import Members, bisected, expected_members, expected_polygons
 from .species import QUALITY_LIMITS, Order, Range, Species
 
 _FEW = 12.0  # a kind with no more members than this keeps them all
@@ -33,8 +32,7 @@ _ROUND = 0.6
 _LEAF_FRACTION = 0.02, 0.06  # of the plant's reach: leaves that are too short, or long enough, to make its outline
 _SHORTEST = 0.5  # of the length of boughs
 _SWAY_HIGH = 1.25  # highest factor on the random bend of joints: the bound of a plant grows with it
-_DETAIL_HIGH = 16.0
-_STEPS = 36  # of bisection: to a hundred millionth of a unit
+_BISECTED = 16.0, 36  # detail at most, and steps: to a hundred millionth of a unit
 
 
 @lru_cache(maxsize=256)
@@ -88,9 +86,11 @@ def with_quality(species: Species, quality: float) -> Species:
         return _thinned(_with_tiers(species, tiers), members, detail)
 
     # Sides and segments as real numbers make the count continuous; once they are whole, members make up for it.
-    detail = _bisected(lambda d: expected_polygons(thinned(_shapes(species, members, d), d)), target)
+    detail = bisected(lambda d: expected_polygons(thinned(_shapes(species, members, d), d)), target, *_BISECTED)
     shapes = [(round(k), round(s)) for k, s in _shapes(species, members, detail)]
-    return _kept(species, thinned(shapes, _bisected(lambda d: expected_polygons(thinned(shapes, d)), target)))
+    return _kept(
+        species, thinned(shapes, bisected(lambda d: expected_polygons(thinned(shapes, d)), target, *_BISECTED))
+    )
 
 
 def _tiers(species: Species) -> list[Order]:
@@ -108,15 +108,6 @@ def _numbers(members: Members, species: Species) -> tuple[list[float], list[floa
     """Expected numbers on one plant of the branches of each of `_tiers`, and of their leaves."""
     every = [*members.branches, members.spurs], [*members.leaves, members.spur_leaves]
     return tuple(numbers[: len(_tiers(species))] for numbers in every)
-
-
-def _bisected(polygons: Callable[[float], float], target: float) -> float:
-    """Detail at which a count that grows with it reaches the target, or the end of the interval."""
-    low, high = 0.0, _DETAIL_HIGH
-    for _ in range(_STEPS):
-        middle = (low + high) / 2
-        low, high = (middle, high) if polygons(middle) < target else (low, middle)
-    return (low + high) / 2
 
 
 def _shapes(species: Species, members: Members, detail: float) -> list[tuple[float, float]]:

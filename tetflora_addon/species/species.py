@@ -121,6 +121,12 @@ class Nodes(NamedTuple):
         """The law of nodes of which so many are alive now."""
         return NodeLaw(self.begin, self.end, self.power, self.whole * number, self.below * number)
 
+    def ends(self, law: NodeLaw, start: float, now: float) -> tuple[float, float, float]:
+        """Places of the first, first short-lived and last node on axes ``now`` long, of which ``start`` is bare."""
+        first, top = law.number_at(np.array([start, self.until]) * now)
+        last = first + self.kept * (top - first)
+        return start * now, *law.place_of([last - self.fresh * (last - first), last]).tolist()
+
 
 @dataclass(frozen=True)
 class PartGrown:
@@ -133,52 +139,38 @@ class PartGrown:
     laterals: Nodes
     spurs: Nodes
     dead: Nodes
-    conical: float = 0.0  # by how much the topmost children are shorter than the crown's shape would have them
     #: Fractions of the children, from the lowest up and from the topmost down, that are about to die or just grow.
     ramps: tuple[float, float] = (0.0, 0.0)
 
 
-#: Lowest part of the children that live for a while in which they are the shorter the sooner they go.
-_FADING = 0.9
+#: Lower part of the children that live for a while: the sooner they go, the shorter; above, the later they came.
+_FADING = 0.6
 #: Middles of equal parts of a whole, over which expectations are means.
 EVEN = (np.arange(256) + 0.5) / 256
 
 
-def some_nodes(ends: ArrayLike, extra: float) -> tuple[Floats, Floats, Mask]:
-    """Places of children in nodes, as many as stand for all.
+def some_nodes(law: NodeLaw, ends: ArrayLike, extra: float) -> tuple[Floats, Floats, Mask]:
+    """Places (512,) of children between ``ends``, see `Nodes.ends`, as many as stand for all.
 
-    Parameters
-    ----------
-    ends : (3,) float64
-        Where nodes begin, where those begin that live for a while, and where all end.
-    extra : float
-        As of `Nodes`.
-
-    Returns
-    -------
-    node : (512,) float64
-    weight : (512,) float64
-        How many children each stands for, 1 on the mean.
-    extra : (512,) bool
-        Whether they live for a while.
+    With them, how many each stands for (512,), 1 on the mean, and whether it lives for a while (512,).
     """
-    base, fresh, tip = ends
+    base, fresh, tip = law.number_at(ends)
     weight = np.array([tip - base, extra * (tip - fresh)])
     node = np.concatenate([base + (tip - base) * EVEN, fresh + (tip - fresh) * EVEN])
     weight = np.repeat(weight / max(weight.mean(), 1e-12), len(EVEN))
-    return node, weight, np.repeat([False, True], len(EVEN))
+    return law.place_of(node), weight, np.repeat([False, True], len(EVEN))
 
 
-def faded(fraction: Floats, first: ArrayLike, extra: Mask) -> Floats:
-    """Factor (n,) on the lengths of laterals at fractions (n,) of them: those that live for a while begin at one."""
-    part = np.clip((fraction - first) / np.maximum(_FADING * (1 - np.asarray(first)), 1e-9), 0, 1)
-    return np.where(extra, part, 1.0)
+def faded(place: Floats, first: ArrayLike, long: ArrayLike, extra: Mask) -> Floats:
+    """Factor (n,) on lengths of laterals at places (n,): those that live for a while are on so long a part from one."""
+    part = (place - first) / np.maximum(long, 1e-9)
+    return np.where(extra, np.clip(np.minimum(part / _FADING, (1 - part) / (1 - _FADING)), 0, 1), 1.0)
 
 
-def shortened(fraction: Floats, conical: ArrayLike, low: ArrayLike, high: ArrayLike) -> Floats:
-    """Factor (...) on lengths of laterals at fractions (...) of them, by ``conical`` and ``ramps`` of `PartGrown`."""
+def shortened(fraction: Floats, low: ArrayLike, high: ArrayLike) -> Floats:
+    """Factor (...) on lengths of laterals at fractions (...) of their part of a branch, by ``ramps`` of `PartGrown`."""
     new = np.clip((1 - fraction) / np.maximum(high, 1e-9), 0, 1)
-    return (1 - conical * fraction) * np.clip(fraction / np.maximum(low, 1e-9), 0, 1) * new
+    return np.clip(fraction / np.maximum(low, 1e-9), 0, 1) * new
 
 
 DAYS = 365.0

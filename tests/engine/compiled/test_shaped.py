@@ -37,7 +37,7 @@ from tetflora_addon.species.catalog import load_species
 from tetflora_addon.species.quality import with_quality
 from tetflora_addon.subplants.pieces import wood_areas
 
-KINDS = ("rich", "spruce 30", "beech")
+KINDS = ("rich", "spruce 20", "beech")
 FORMS = (
     {"width": 2.0, "thickness": 1.5},
     {"width": 0.5, "base": 0.5, "leaves": 0.6},
@@ -61,7 +61,7 @@ def shaped(n: int, **form: float) -> Seeds:
 @pytest.mark.parametrize("form", FORMS)
 @pytest.mark.parametrize("kind", KINDS)
 def test_expected_totals_are_means_of_grown_plants(kind: str, form: dict[str, float]) -> None:
-    flora, n = flora_of(kind), 160
+    flora, n = flora_of(kind, 0.01), 160
     own = trunks(flora.rows, shaped(n, **form))
     pieces = expanded(flora, own)
     branches = whole_of(flora, pieces).branches
@@ -211,7 +211,7 @@ def grown_sizes(flora: Flora, seeds: Seeds) -> tuple[NDArray[np.float64], NDArra
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_sizes_are_measured_and_fitted_as_plants_grow(kind: str) -> None:
-    flora, n = flora_of(kind, 0.02), 12
+    flora, n = flora_of(kind, 0.06), 12
     rng = np.random.default_rng(3)
     seeds = replace(plants(np.arange(n)), crown=crown_shapes(n, rng.uniform(0.6, 1.6, n), rng.uniform(0, 0.5, n)))
     height, width = measured(flora, seeds)
