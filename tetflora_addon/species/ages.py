@@ -95,11 +95,10 @@ def _raised(start: Range, bare: float, key: str) -> Range:
 
 
 STAGES = ("seedling", "sapling", "mature", "old", "dying", "dead")
-#: Below a crown, nodes grow as this power of the height; with forks, there are so many more of them.
-_POWER, _MORE = 0.4, 1.5
+#: Below a crown, nodes grow as one of these powers of the height; with forks, there are so many more of them.
+_POWERS, _MORE = (1.0, 0.4), 1.5
 _ROSETTE = 0.9  # a bare part longer than this is the stem of a palm, whose crown is as long at any age
-#: Powers by which limbs and twigs of a plant without branches between them, and twigs of others, follow the limbs.
-_TWIGS = 0.25
+_TWIGS = 0.25  # power by which twigs follow the limbs; branches of a plant with one order of them do so too
 _LONGEST = 0.6  # longest branches in lengths of their parents, where the description has shorter ones
 #: Girth of branches follows length as this power, that of stools the stems'; radius of the thinnest tips, meters.
 _STOUT, _STOOL, _TIP = 1.15, 0.7, 0.0012
@@ -169,16 +168,16 @@ def with_age(species: Species, years: float) -> Species:
     if ages.scaled or species.skeleton is not None:
         other = _scaled(species, min(ages.heights(years), 1.0))
     else:
-        other = _Aged(species, ages, years).species()
+        other = _Aged(species, years, _crowding(species)[0]).species()
     return replace(other, aged=(species, years))
 
 
 @lru_cache(maxsize=256)
-def _extra(species: Species) -> float:
-    """Branches of stems and limbs that live for a while, for each of the others, where all of the crown has them."""
-    ages = ages_of(species)
-    young = [_Aged(species, ages, part * ages.full, 1.0, _FULLER[0]) for part in _BAREST]
-    return max(one.found("extra", _EXTRA) for one in young)
+def _crowding(species: Species) -> tuple[float, float]:
+    """How crowded branches of young plants are, 0 to 1, and how many live for a while where all of a crown has them."""
+    ages = [part * ages_of(species).full for part in _BAREST]
+    crowded = max(round(_Aged(species, years).found("crowded", 1.0), 2) for years in ages)
+    return crowded, max(_Aged(species, years, crowded, 1.0, _FULLER[0]).found("extra", _EXTRA) for years in ages)
 
 
 def _scaled(species: Species, factor: float) -> Species:
@@ -206,11 +205,14 @@ class _Aged:
 
     ``stem`` and ``last`` are the order of the stem, and of the twigs. By order, ``whole`` are typical lengths when
     full-grown, meters; ``now`` and ``before`` lengths over those, now and a year ago; ``stout`` radii over those when
-    full-grown. ``fresh`` is the fraction of branches with more that live a while, ``thin`` a factor on leaf numbers.
+    full-grown. ``crowded`` and ``extra`` are as of `_crowding`, ``fresh`` is the fraction of branches with ``extra``
+    more that live a while, ``thin`` a factor on leaf numbers.
     """
 
-    def __init__(self, species: Species, ages: Ages, years: float, fresh: float = 0.0, thin: float = 1.0) -> None:
-        self.one, self.ages, self.years = species, ages, years
+    def __init__(
+        self, species: Species, years: float, crowded: float = 0.0, fresh: float = 0.0, thin: float = 1.0
+    ) -> None:
+        self.one, self.ages, self.years = species, (ages := ages_of(species)), years
         self.stem, self.last = _stem(species), len(species.orders) - 1
         self.whole = np.cumprod([order.length.mean for order in species.orders]).tolist()
         self.rosette = species.orders[self.stem].branch_start.mean > _ROSETTE
@@ -221,7 +223,7 @@ class _Aged:
         self.youth = float(np.clip((1 - self.now[self.stem]) / 0.5, 0, 1))
         self.declined = ages.declined(years)
         self.dead = max(years - ages.lifespan, 1e-6) if years >= ages.lifespan else 0.0
-        self.extra, self.fresh, self.thin = 0.0, fresh, thin
+        self.crowded, self.extra, self.fresh, self.thin = crowded, 0.0, fresh, thin
 
     def _lengths(self, years: float) -> list[float]:
         """Lengths by order over those when full-grown."""
@@ -241,10 +243,9 @@ class _Aged:
         out = self._made()
         if self.stem + 1 >= self.last or self.dead:
             return out
-        grown = self.now[self.stem] >= 1
-        self.thin = min(self.wanted / max(expected_leaf_area(out), 1e-9), _FULLER[grown])
-        if self.thin == _FULLER[0] and not grown:
-            self.extra = _extra(self.one)
+        self.thin = min(self.wanted / max(expected_leaf_area(out), 1e-9), _FULLER[self.now[self.stem] >= 1])
+        if self.thin == _FULLER[0]:
+            self.extra = _crowding(self.one)[1]
             self.fresh = self.found("fresh", 1.0)
         return self._made()
 
@@ -369,7 +370,7 @@ class _Aged:
         For each of the fresh ones ``extra`` more live for a while; None for sorts that have no such children.
         """
         start, now = min(start, 0.99), 1.0 if o < self.stem else self.now[o]
-        power = 1.0 if start > _ROSETTE else _POWER
+        power = 1.0 if start > _ROSETTE else _POWERS[0] + (_POWERS[1] - _POWERS[0]) * self.crowded
         law = NodeLaw(start, 1.0, power, 1.0, more * start / ((1 - start) * power))
         first, top = (float(law.number_at(place)) for place in (self._bare(o, start), until * now))
         extra, fresh = (0.0, 0.0) if extra is None else (extra, self.fresh)

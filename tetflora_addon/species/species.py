@@ -169,8 +169,7 @@ def faded(place: Floats, first: ArrayLike, long: ArrayLike, extra: Mask) -> Floa
 
 def shortened(fraction: Floats, low: ArrayLike, high: ArrayLike) -> Floats:
     """Factor (...) on lengths of laterals at fractions (...) of their part of a branch, by ``ramps`` of `PartGrown`."""
-    new = np.clip((1 - fraction) / np.maximum(high, 1e-9), 0, 1)
-    return np.clip(fraction / np.maximum(low, 1e-9), 0, 1) * new
+    return np.clip(fraction / np.maximum(low, 1e-9), 0, 1) * np.clip((1 - fraction) / np.maximum(high, 1e-9), 0, 1)
 
 
 DAYS = 365.0
