@@ -178,7 +178,7 @@ def _extra(species: Species) -> float:
     """Branches of stems and limbs that live for a while, for each of the others, where all of the crown has them."""
     ages = ages_of(species)
     young = [_Aged(species, ages, part * ages.full, 1.0, _FULLER[0]) for part in _BAREST]
-    return max(one.found("extra", _EXTRA) for one in young)
+    return max(one.solve_for("extra", _EXTRA) for one in young)
 
 
 def _scaled(species: Species, factor: float) -> Species:
@@ -238,15 +238,15 @@ class _Aged:
 
     def species(self) -> Species:
         """The species at that age."""
-        out = self._made()
+        out = self._build()
         if self.stem + 1 >= self.last or self.dead:
             return out
         grown = self.now[self.stem] >= 1
         self.thin = min(self.wanted / max(expected_leaf_area(out), 1e-9), _FULLER[grown])
         if self.thin == _FULLER[0] and not grown:
             self.extra = _extra(self.one)
-            self.fresh = self.found("fresh", 1.0)
-        return self._made()
+            self.fresh = self.solve_for("fresh", 1.0)
+        return self._build()
 
     @property
     def wanted(self) -> float:
@@ -257,16 +257,16 @@ class _Aged:
         closed = max(self.height / _SMALL, self.ages.heights(self.years))  # low shrubs' crowns at their full height
         return expected_leaf_area(self.one) * leaves * min(closed, 1.0)
 
-    def found(self, name: str, most: float) -> float:
+    def solve_for(self, name: str, most: float) -> float:
         """The value of a number with which leaves are as wanted, or the most that it may be."""
 
         def area(value: float) -> float:
             setattr(self, name, value)
-            return expected_leaf_area(self._made())
+            return expected_leaf_area(self._build())
 
         return bisected(area, self.wanted, most, _STEPS)
 
-    def _made(self) -> Species:
+    def _build(self) -> Species:
         one = self.one
         orders = tuple(self._order(o) for o in range(len(one.orders)))
         spur, dead = one.spur, one.dead
