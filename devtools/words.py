@@ -4,7 +4,7 @@
 
 Names that are common words where they are right cannot be found by their letters: ``look``, ``afford`` and ``real`` of
 what is counted, ``code`` of coordinate systems, ``form`` of skeletons and proxies, ``girth`` of trunks' diameters.
-Reviews have to see these. `fillers` finds variables of the product whose names tell nothing.
+Reviews have to see these. `fillers` finds variables, fields and functions of the product whose names tell nothing.
 """
 
 from __future__ import annotations
@@ -55,8 +55,11 @@ _NAMES = {
 }
 _PATTERNS = [(re.compile(old, re.IGNORECASE), new) for old, new in _SPELLING.items()]
 _PATTERNS += [(re.compile(rf"(?<!\w)(?:{old})(?!\w)"), new) for old, new in _NAMES.items()]
-#: What variables and parameters are not called: a noun says what they hold.
+#: What variables, parameters, fields and functions are not called, with or without a first underscore: a noun says what
+#: they hold, a verb what they do.
 _FILLERS = {"at", "found", "made", "own", "some", "there"}
+#: Functions may be called that: they evaluate something at places. And a property that is saved in files.
+_EVALUATES, _SAVED = "at", {("tetflora_addon/blender/placing/properties.py", "TetFloraLayer", "made")}
 #: Files of foreign words, of others and of tests by earlier names; and units of coordinate systems, as standards spell
 #: them, and addresses.
 _FOREIGN = ("tetflora_addon/geodata/*.json", "tests/data/*", "examples/data/*", "LICENSE", "devtools/proofs.json")
@@ -77,10 +80,21 @@ def problems(name: str, lines: list[str]) -> list[str]:
 
 
 def fillers(name: str, tree: ast.Module) -> list[str]:
-    """Variables and parameters in functions of a file that have a filler for a name, one line each."""
-    functions = [n for n in ast.walk(tree) if isinstance(n, ast.FunctionDef | ast.Lambda)]
-    nodes = [n for function in functions for n in ast.walk(function)]
-    bound = [(n.lineno, n.id) for n in nodes if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Store)]
+    """Variables, parameters, fields and functions of a file that have a filler for a name, one line each."""
+    nodes = list(ast.walk(tree))
+    saved = {
+        part.target
+        for one in nodes
+        if isinstance(one, ast.ClassDef)
+        for part in one.body
+        if isinstance(part, ast.AnnAssign) and (name, one.name, getattr(part.target, "id", "")) in _SAVED
+    }
+    stored = [n for n in nodes if isinstance(getattr(n, "ctx", None), ast.Store) and n not in saved]
+    bound = [(n.lineno, n.id) for n in stored if isinstance(n, ast.Name)]
+    # Only of the object itself: others may be Blender's.
+    bound += [(n.lineno, n.attr) for n in stored if isinstance(n, ast.Attribute) and ast.unparse(n.value) == "self"]
     bound += [(n.lineno, n.arg) for n in nodes if isinstance(n, ast.arg)]
-    words = sorted({(line, word) for line, word in bound if word in _FILLERS})
-    return [f'{name}:{line}: "{word}" says nothing of what it holds' for line, word in words]
+    functions = [n for n in nodes if isinstance(n, ast.FunctionDef | ast.AsyncFunctionDef)]
+    bound += [(n.lineno, n.name) for n in functions if n.name != _EVALUATES]
+    words = sorted({(line, word) for line, word in bound if word.removeprefix("_") in _FILLERS})
+    return [f'{name}:{line}: "{word}" says nothing of what it holds or does' for line, word in words]

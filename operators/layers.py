@@ -218,16 +218,16 @@ class TETFLORA_OT_move_layer(Reporting, Operator, label="Move Layer", told="dire
             return self.execute(context)
         if (index := layers.index_of(context.scene, self.layer)) >= 0:
             context.scene.tetflora.layers_index = index
-        self._before, self._at = [one.uid for one in context.scene.tetflora.layers], event.mouse_y
+        self._before, self._mouse_y = [one.uid for one in context.scene.tetflora.layers], event.mouse_y
         context.window_manager.modal_handler_add(self)
         context.window.cursor_modal_set('MOVE_Y')
         return {'RUNNING_MODAL'}
 
     def modal(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
         scene, row = context.scene, _ROW * context.preferences.system.ui_scale
-        while abs(self._at - event.mouse_y) >= row:
-            step = 1 if event.mouse_y < self._at else -1
-            self._at -= step * row
+        while abs(self._mouse_y - event.mouse_y) >= row:
+            step = 1 if event.mouse_y < self._mouse_y else -1
+            self._mouse_y -= step * row
             layers.move_layer(scene, step)
             context.area.tag_redraw()
         done = event.type in {'LEFTMOUSE', 'RET'} and event.value == 'PRESS'
@@ -404,9 +404,9 @@ class TETFLORA_OT_ground_cover(_InParts, Operator, label="Ground Cover", needs=(
     def finish(self, context: bpy.types.Context, result: cover.CoverResult) -> set[str]:
         points.schedule()
         kept = f'; "{result.bare[0]}" keeps its own material' if result.bare else ""
-        if not result.made.number:
-            return self.refused(f"Nothing grows here: {result.made.reason}")
-        return self.done(f"{counted(result.made.number, 'plant')} cover the ground{kept}")
+        if not result.placed.number:
+            return self.refused(f"Nothing grows here: {result.placed.reason}")
+        return self.done(f"{counted(result.placed.number, 'plant')} cover the ground{kept}")
 
 
 class TETFLORA_OT_grow_stand(ModalJob, Operator, label="Grow Stand", needs=(in_object_mode, ground_found)):

@@ -63,7 +63,7 @@ class TETFLORA_OT_refine(base.ModalJob, Operator, label="Refine", needs=(base.in
             auto.refined(scene)
         failed_frames.clear()
         redraw()
-        self.report({'INFO'}, _made(scene, statistics))
+        self.report({'INFO'}, _outcome(scene, statistics))
         if not statistics.complete and statistics.passes:
             self.report({'INFO'}, "Stopped early; click Refine again to complete the result")
         outside = cut_off(scene)[0] or _unseen(scene, statistics)
@@ -76,7 +76,7 @@ class TETFLORA_OT_refine(base.ModalJob, Operator, label="Refine", needs=(base.in
         return {'FINISHED'}
 
 
-def _made(scene: Scene, statistics: Statistics) -> str:
+def _outcome(scene: Scene, statistics: Statistics) -> str:
     """What was refined, and what of it was made."""
     instances = base.counted(statistics.instances, "instance")
     if not (statistics.passes or statistics.plants) and statistics.instances_whole == statistics.instances > 0:

@@ -57,7 +57,7 @@ def menu(label: str) -> Callable[[Draw], type[Menu]]:
 def _drawn_by(kind: type, members: dict[str, object], split: bool = False) -> Callable[[Draw], type]:
     """A class of a function's name and module, which that draws; split, labels are to the left of values."""
 
-    def made(function: Draw) -> type:
+    def decorate(function: Draw) -> type:
         def draw(self: Any, context: Context) -> None:
             if split:
                 self.layout.use_property_split, self.layout.use_property_decorate = True, False
@@ -66,7 +66,7 @@ def _drawn_by(kind: type, members: dict[str, object], split: bool = False) -> Ca
         about = {"draw": draw, "__doc__": function.__doc__, "__module__": function.__module__}
         return type(function.__name__, (kind,), members | about)
 
-    return made
+    return decorate
 
 
 def section(

@@ -35,7 +35,7 @@ KEYS = (
     Shortcut("tetflora.refine", 'F', ctrl=True, alt=True, shift=True),
 )
 
-_made: list[tuple[bpy.types.KeyMap, bpy.types.KeyMapItem]] = []
+_keymap_items: list[tuple[bpy.types.KeyMap, bpy.types.KeyMapItem]] = []
 
 
 def items() -> list[tuple[bpy.types.KeyMap, bpy.types.KeyMapItem]]:
@@ -102,12 +102,12 @@ def register() -> None:
         )
         if key.menu:
             item.properties.name = key.menu
-        _made.append((keymap, item))
+        _keymap_items.append((keymap, item))
 
 
 def unregister() -> None:
     """Remove the keys, and draw the page no longer."""
-    for keymap, item in reversed(_made):
+    for keymap, item in reversed(_keymap_items):
         keymap.keymap_items.remove(item)
-    _made.clear()
+    _keymap_items.clear()
     del TetFloraPreferences.draw

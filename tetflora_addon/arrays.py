@@ -341,7 +341,7 @@ class Chunks(Generic[Rows]):
     """Things of one kind in the chunks that they came in; what is taken out is only marked until all are joined."""
 
     def __init__(self, first: Rows) -> None:
-        self.kind, self._chunks, self._there, self._number = type(first), [], [], 0
+        self.kind, self._chunks, self._unmarked, self._number = type(first), [], [], 0
         self.marked = 0
         self.append(first)
 
@@ -357,7 +357,7 @@ class Chunks(Generic[Rows]):
     def append(self, new: Rows) -> None:
         """Put things behind all others, not copied."""
         self._chunks.append(new)
-        self._there.append(np.ones(len(new), bool))
+        self._unmarked.append(np.ones(len(new), bool))
         self._number += len(new)
 
     def take_out(self, rows: Integers) -> Rows:
@@ -373,19 +373,19 @@ class Chunks(Generic[Rows]):
         return self.kind.concatenate(out or [self._chunks[0].take(slice(0))])
 
     @property
-    def there(self) -> Mask:
+    def unmarked(self) -> Mask:
         """Rows (n,) that are not marked."""
-        return np.concatenate(self._there)
+        return np.concatenate(self._unmarked)
 
     def chunks(self) -> Iterator[tuple[Rows, Mask]]:
         """Each chunk (k), and which of its rows (k,) are not marked."""
-        return zip(self._chunks, self._there, strict=True)
+        return zip(self._chunks, self._unmarked, strict=True)
 
     def joined(self) -> Rows:
         """All that is not marked, as the only chunk from now on: rows have new numbers, in the same order."""
         if len(self._chunks) > 1 or self.marked:
             one = self.kind.concatenate([chunk.take(kept) for chunk, kept in self.chunks()])
-            self._chunks, self._there, self._number, self.marked = [], [], 0, 0
+            self._chunks, self._unmarked, self._number, self.marked = [], [], 0, 0
             self.append(one)
         return self._chunks[0]
 

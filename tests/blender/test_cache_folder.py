@@ -58,12 +58,12 @@ def test_an_edited_species_is_looked_at_once(cache, tmp_path, monkeypatch):
     editor = scene.tetflora.species_editor
     editor.species, editor.order = "fern", "0"
     editor.length[0] = 0.05
-    monkeypatch.setattr(facet_weights, "_found", {})
+    monkeypatch.setattr(facet_weights, "_measured", {})
     refine.refine(scene, depsgraph())
     (kept,) = (tmp_path / "cache").iterdir()
     (tmp_path / "cache" / "notes.txt").write_text("mine")
 
-    monkeypatch.setattr(facet_weights, "_found", {})
+    monkeypatch.setattr(facet_weights, "_measured", {})
     facet_weights._of_states.cache_clear()
     monkeypatch.setattr(facet_weights, "fitting", lambda *_: pytest.fail("looked at again"))
     refine.refine(scene, depsgraph())

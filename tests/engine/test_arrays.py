@@ -76,7 +76,7 @@ def test_chunks_hold_what_is_not_taken_out(steps: list, first: int, seed: int) -
     for fraction, coming in steps:
         out = rng.random(len(left)) < fraction
         asked = other.take_out(np.flatnonzero(out))
-        found = some.take_out(np.flatnonzero(some.there)[out])
+        found = some.take_out(np.flatnonzero(some.unmarked)[out])
         for each in (asked, found):
             np.testing.assert_array_equal(each.marks.number, left[out])
             np.testing.assert_array_equal(each.size, left[out] / 2)
@@ -89,4 +89,4 @@ def test_chunks_hold_what_is_not_taken_out(steps: list, first: int, seed: int) -
     for each in (some, other):
         np.testing.assert_array_equal(each.joined().marks.place[:, 1], 2.0 * left)
         assert each.joined() is each.joined()
-        assert each.there.all()
+        assert each.unmarked.all()

@@ -188,14 +188,48 @@ def test_words_that_gave_way_are_found_and_those_of_others_are_not() -> None:
     assert words.problems("tests/data/a.csv", gone) == []
 
 
+def _fillers(code: str, name: str = "a.py") -> list[str]:
+    return [text.split(": ")[0] + text.split('"')[1] for text in words.fillers(name, ast.parse(code))]
+
+
 def test_variables_of_the_product_are_named_by_what_they_hold() -> None:
     code = """
-class Field:
-    made: int
-
 def plants_of(at, *, scale=1.0):
     (own, light), rest = at
     return [some.size for some in rest if (found := lambda made: made)(some.own) and self.there]
 """
-    told = [text.split(": ")[0] + text.split('"')[1] for text in words.fillers("a.py", ast.parse(code))]
-    assert told == ["a.py:5at", "a.py:6own", "a.py:7found", "a.py:7made", "a.py:7some"]
+    assert _fillers(code) == ["a.py:2at", "a.py:3own", "a.py:4found", "a.py:4made", "a.py:4some"]
+
+
+def test_fields_and_functions_of_the_product_are_named_by_what_they_hold_and_do() -> None:
+    code = """
+_found: dict[str, int] = {}
+
+class Layer:
+    made: int
+    at = 0.0
+
+    def __init__(self, layer):
+        self._there, layer.made = True, 3
+
+    def _own(self):
+        def some():
+            return self.found(made=layer.made)
+
+    @property
+    def found(self):
+        return self._there
+"""
+    told = ["a.py:2_found", "a.py:5made", "a.py:6at", "a.py:9_there", "a.py:11_own", "a.py:12some", "a.py:16found"]
+    assert _fillers(code) == told
+
+
+def test_what_evaluates_at_places_and_what_is_saved_keep_their_names() -> None:
+    assert _fillers("class Raster:\n    def at(self, places):\n        return places") == []
+    layer = "class TetFloraLayer:\n    made: integer()\n    found: integer()"
+    saved = "tetflora_addon/blender/placing/properties.py"
+    assert _fillers(layer, saved) == [f"{saved}:3found"]
+    assert _fillers(layer) == ["a.py:2made", "a.py:3found"]
+    source = rooms.tree(ROOT / saved)
+    assert any(isinstance(one, ast.ClassDef) and one.name == "TetFloraLayer" for one in source.body)
+    assert words.fillers("elsewhere.py", source) != [] == words.fillers(saved, source)

@@ -263,19 +263,19 @@ def test_a_species_of_ones_own_is_looked_at_once_for_all_sessions(
 ) -> None:
     """Shares and clumping of one that is not shipped: the same numbers from the disk, beside whatever other species."""
     monkeypatch.setattr(facet_weights, "shipped", dict)
-    monkeypatch.setattr(facet_weights, "_found", {})
+    monkeypatch.setattr(facet_weights, "_measured", {})
     one, other = load_species("flower"), load_species("grass")
     alone = compile_species([one])
     weights, clumping = facet_weights.facet_weights(alone), alone.clumping
     assert len(files(folder)) == 2
-    monkeypatch.setattr(facet_weights, "_found", {})  # another session
+    monkeypatch.setattr(facet_weights, "_measured", {})  # another session
     monkeypatch.setattr(facet_weights, "fitting", lambda _, n, _rays: pytest.fail(f"looked at {n} again"))
     monkeypatch.setattr(facet_weights, "shipped", lambda: {facet_weights.digest(compile_species([other]), 0): TABLE})
     both = compile_species([other, one])
     rows = both.rows["species"] == 1
     np.testing.assert_array_equal(facet_weights.facet_weights(both).whole[:, rows], weights.whole)
-    np.testing.assert_array_equal(facet_weights.facet_weights(both).own[:, rows], weights.own)
-    for name in ("own", "root", "density"):
+    np.testing.assert_array_equal(facet_weights.facet_weights(both).branch_only[:, rows], weights.branch_only)
+    for name in ("branch_only", "root", "density"):
         np.testing.assert_array_equal(getattr(both.clumping, name)[rows], getattr(clumping, name))
     assert len(files(folder)) == 3  # the clumping of the other
 
@@ -291,7 +291,7 @@ def test_species_that_are_found_together_are_what_they_are_alone(monkeypatch: py
     some = [species_from_dict(data, name, f"{name}.json") for name, data in files.items()]
     found = []
     for species in ([some[0]], [some[1]], some, some[::-1]):
-        monkeypatch.setattr(facet_weights, "_found", {})
+        monkeypatch.setattr(facet_weights, "_measured", {})
         flora = compile_species(species)
         weights = facet_weights.facet_weights(flora)
         found.append({one.identifier: weights.whole[:, flora.rows["species"] == n] for n, one in enumerate(species)})

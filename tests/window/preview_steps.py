@@ -29,13 +29,13 @@ def through_the_year(ui, scene):
     def size():
         return float(np.ptp(shapes(scene).positions[:, 2]))
 
-    def made():
-        return state.find(scene).made
+    def changes():
+        return state.find(scene).changes
 
-    tall, before = size(), made()
+    tall, before = size(), changes()
     with ui.override():
         scene.tetflora.year.season = 'WINTER'
-    yield from ui.until(lambda: made() > before, 20, "winter")
+    yield from ui.until(lambda: changes() > before, 20, "winter")
     ui.values["winter"] = [year.enabled, year.day]
     for frame, years in ((1, 0.0), (2, 3.0)):
         year.years = years

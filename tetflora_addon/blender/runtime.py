@@ -139,8 +139,8 @@ class Outlook(Generic[_Result]):
 
     def __init__(self, find: Callable[..., _Result | Generator], old: float = inf) -> None:
         self._find, self._old = find, old
-        self._found: dict[tuple[int, str], _Result] = {}
-        self._took, self._at = (0.0, 0.0), -inf
+        self._results: dict[tuple[int, str], _Result] = {}
+        self._took, self._updated = (0.0, 0.0), -inf
         self._steps, self._shown, self._changed, self._longest, self._pause = None, [], False, 0.0, _QUIET
         self._timer = partial(self._look)  # one object, which Blender can find again
 
@@ -158,9 +158,9 @@ class Outlook(Generic[_Result]):
         key = scene.session_uid, view_layer.name
         if bpy.app.background:
             return run_to_end(self._all([(scene, view_layer)]))[key]
-        if self._steps is None and (key not in self._found or time.perf_counter() - self._at > self._old):
+        if self._steps is None and (key not in self._results or time.perf_counter() - self._updated > self._old):
             self.ask()
-        return self._found.get(key)
+        return self._results.get(key)
 
     def _all(self, shown: list[tuple[bpy.types.Scene, bpy.types.ViewLayer]]) -> Generator:
         results = {}
@@ -188,10 +188,10 @@ class Outlook(Generic[_Result]):
         self._longest = max(self._longest, now - begin)
         if results is None:
             return _SLICE
-        self._at, self._took = now, (self._took[1], self._longest)
+        self._updated, self._took = now, (self._took[1], self._longest)
         self._pause = max(_QUIET, 30.0 * min(self._took))
-        if results != self._found:
-            self._found = results
+        if results != self._results:
+            self._results = results
             redraw('UI')  # where panels are: views take seconds without a graphics card
         return None
 
@@ -199,7 +199,7 @@ class Outlook(Generic[_Result]):
         """Look no more."""
         self._handlers.unregister()
         call_off(self._timer)
-        self._found, self._steps = {}, None
+        self._results, self._steps = {}, None
 
 
 @dataclass(eq=False)

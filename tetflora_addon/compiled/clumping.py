@@ -316,15 +316,15 @@ LEAST, MOST = 0.1, 1.5
 class Clumping:
     """What the factor of every row follows from; arrays by row."""
 
-    #: whole and own, (r,): offsets: of a whole sub-plant, and of what its branch itself bears.
+    #: whole and branch_only, (r,): offsets: of a whole sub-plant, and of what its branch itself bears.
     whole: Floats
-    own: Floats
+    branch_only: Floats
     root: Floats  # (r,): √m, at plant scale 1
     density: Floats  # (r,)
     length: Floats  # (r,): usual length of the branch at plant scale 1, meters
 
     def coefficients(self, branches: Branches, offset: Floats) -> Floats:
-        """What is constant and what is divided by √h (n, 2), for branches with the offsets of `whole` or `own`."""
+        """What is constant and what is divided by √h (n, 2), of branches; offsets are `whole` or `branch_only`."""
         row = branches.row
         relative = np.log(np.maximum(branches.length, 1e-12) / (branches.scale * self.length[row]))
         constant = offset[row] + self.density[row] * np.clip(relative, -WIDEST, WIDEST)

@@ -275,8 +275,8 @@ class Measure:
 
     def __init__(self, species: Species, ratios: tuple[float, float] | None = None) -> None:
         self.flora, self._ratios = compile_species([species]), ratios  # flora: of this species alone
-        self._some = Seeds.upright(_PLANTS)
-        self._lengths = trunks(self.flora.rows, self._some).length
+        self._seeds = Seeds.upright(_PLANTS)
+        self._lengths = trunks(self.flora.rows, self._seeds).length
         self.length = float(self._lengths.mean())
         self._typical = species.orders[0].length.mean
 
@@ -286,7 +286,7 @@ class Measure:
         if self._ratios is not None:
             return self._ratios
         part = self.length / self._typical
-        return tuple(part * float((size / self._lengths).mean()) for size in measured(self.flora, self._some))
+        return tuple(part * float((size / self._lengths).mean()) for size in measured(self.flora, self._seeds))
 
     @property
     def height(self) -> float:

@@ -162,7 +162,7 @@ def _even_parts(crown: Crown) -> CrownParts:
     return CrownParts(place, number, area, size, size, np.zeros(_PARTS), none, none, np.zeros(_PARTS), none)
 
 
-def _some(points: Points, row: int, lengths: Floats) -> tuple[Floats, Integers, Floats, Floats]:
+def _samples(points: Points, row: int, lengths: Floats) -> tuple[Floats, Integers, Floats, Floats]:
     """Places (n, 3) of samples of upright trunks of lengths (k,), rows (n,), samples of each row (n,), leaves' ways."""
     # Few of large branches, which have most of the samples, so that there are as many of small ones.
     first, number = int(points.first[row, -1]), int(points.number[row, -1])
@@ -177,7 +177,7 @@ def _some(points: Points, row: int, lengths: Floats) -> tuple[Floats, Integers, 
 def _leaf_parts(flora: Flora, points: Points, row: int, lengths: Floats) -> CrownParts:
     if not flora.leaf_count[row] > 0:
         return CrownParts.empty()
-    place, rows, like, along = _some(points, row, lengths)
+    place, rows, like, along = _samples(points, row, lengths)
     totals, leaf = flora.averages, flora.leaf
     number, area = totals.leaves[row][rows], totals.leaf_area[row, 1][rows]
     area = area / np.maximum(number, 1e-300)
@@ -193,7 +193,7 @@ def _leaf_parts(flora: Flora, points: Points, row: int, lengths: Floats) -> Crow
 
 
 def _branch_parts(flora: Flora, points: Points, row: int, lengths: Floats) -> CrownParts:
-    place, rows, like, _ = _some(points, row, lengths)
+    place, rows, like, _ = _samples(points, row, lengths)
     length = float(lengths.mean())
     trunk_radius = float(flora.averages.radius[row]) * length / float(flora.averages.length[row])
     totals, bud = flora.averages, flora.species[0].bud

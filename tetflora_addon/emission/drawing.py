@@ -260,7 +260,7 @@ def _drawn_tile(given: Drawing, item: _Item) -> list[Block | Parts | Shown]:
         if tile.again is None:
             break
         expected, known = tile.asked, tile.again
-    return tile.made(number)
+    return tile.release(number)
 
 
 class _Tile(Canvas):
@@ -277,7 +277,7 @@ class _Tile(Canvas):
         self.asked = 0.0  # polygons and facets that there would be of what is seen, with the sides of the drawing
         self.again: bool | None = None  # whether what it asked for is known now, where it is to be drawn again
 
-    def made(self, number: int) -> list[Block | Parts | Shown]:
+    def release(self, number: int) -> list[Block | Parts | Shown]:
         """Meshes by kind, facets by whose they are, and what is drawn as it is; the tile lets go of each."""
         blocks = [
             Block(*what, number, whole, 1.0)

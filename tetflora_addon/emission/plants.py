@@ -215,7 +215,7 @@ def explicit_blocks(flora: Flora, result: Refinement, camera: Camera, tolerance:
         branches = branches.take(np.lexsort([branches.key, np.linalg.norm(branches.position - camera.eye, axis=1)]))
         polygons = piece_totals(flora, as_pieces(branches)).polygons if alone else flora.face_counts(branches)
         runs += [(alone, branches.take(run)) for run in chunks(polygons, BLOCK_POLYGONS)]
-    yield from _made(flora, LeafDetail(flora, camera, tolerance), runs, len(runs) > 1)
+    yield from _blocks(flora, LeafDetail(flora, camera, tolerance), runs, len(runs) > 1)
 
 
 def expanded_blocks(flora: Flora, seeds: Seeds, camera: Camera | None = None) -> Iterator[Block]:
@@ -224,10 +224,10 @@ def expanded_blocks(flora: Flora, seeds: Seeds, camera: Camera | None = None) ->
     full = flora.polygons[plants.row] if plants.crown is None else flora.face_counts(plants)
     runs = [(False, plants.take(run)) for run in chunks(full, BLOCK_POLYGONS)]
     worth = len(runs) > 1 and float(full.sum()) > WORTH_PROCESSES
-    yield from _made(flora, None if camera is None else LeafDetail(flora, camera), runs, worth)
+    yield from _blocks(flora, None if camera is None else LeafDetail(flora, camera), runs, worth)
 
 
-def _made(flora: Flora, detail: LeafDetail | None, runs: list[tuple[bool, Branches]], worth: bool) -> Iterator[Block]:
+def _blocks(flora: Flora, detail: LeafDetail | None, runs: list[tuple[bool, Branches]], worth: bool) -> Iterator[Block]:
     """The meshes of runs of branches, which are alone or with all that grows on them."""
     number = len(runs)
     items = ((n, (n + 1) / number, *runs.pop(0)) for n in range(number))

@@ -109,7 +109,7 @@ class _Tags:
         self.order, self.letter = form[:1], form[1:]  # of bytes, and of offsets
         if not form or (self.letter == "Q" and start[4:] != struct.pack(f"{self.order}HH", 8, 0)):
             raise SceneError(f"{name}: this is no TIFF file; export it as GeoTIFF")
-        self.found = self._directory(self._number(self.letter, struct.calcsize(self.letter), "head"))
+        self.entries = self._directory(self._number(self.letter, struct.calcsize(self.letter), "head"))
 
     def _bytes(self, offset: int, number: int, what: str) -> bytes:
         """A part of the file; what it is begins the message if it is not there."""
@@ -136,9 +136,9 @@ class _Tags:
 
     def _values(self, tag: str) -> tuple | bytes:
         """Values of a tag, a text as bytes; none where there is no such tag."""
-        if tag not in self.found:
+        if tag not in self.entries:
             return ()
-        kind, number, here = self.found[tag]
+        kind, number, here = self.entries[tag]
         if kind not in _TYPES or not number:
             raise self.broken(tag, "has values of a type that it cannot have")
         size = number * struct.calcsize(_TYPES[kind])
@@ -176,7 +176,7 @@ class _Tags:
         """Values (h, w) of the first sample, and which pixels are not in the file, (h, w); yields progress."""
         width, height = self.one("ImageWidth"), self.one("ImageLength")
         checked_size(width, height, f"{self.name}: ")
-        tiled, dtype = "TileOffsets" in self.found, self._dtype()
+        tiled, dtype = "TileOffsets" in self.entries, self._dtype()
         kind = "tile" if tiled else "strip"
         across = self.one("TileWidth") if tiled else width
         down = self.one("TileLength") if tiled else min(self.one("RowsPerStrip", height), height)
@@ -240,16 +240,16 @@ class _Tags:
 
     def mask(self, shape: tuple[int, int]) -> Job[Mask]:
         """Which pixels count, (h, w), by a mask that is another image of the file; yields progress."""
-        directory, seen = self.found, set()
+        directory, seen = self.entries, set()
         try:
             while self.next and self.next not in seen and len(seen) < _MOST_IMAGES:
                 seen.add(self.next)
-                self.found = self._directory(self.next)
+                self.entries = self._directory(self.next)
                 if self.one("NewSubfileType", 0) & 4 and (self.one("ImageLength"), self.one("ImageWidth")) == shape:
                     values, absent = yield from self.pixels()
                     return (values != 0) & ~absent
         finally:
-            self.found = directory
+            self.entries = directory
         return np.ones(shape, bool)
 
     def scale(self) -> tuple[np.float32, np.float32]:
@@ -285,7 +285,7 @@ class _Tags:
             shift = shift if isinstance(shift, tuple) and len(shift) in (3, 7) else ()
             datum = Definition("geo", Ellipsoid(axis, flattening), (*shift, *[0.0] * (7 - len(shift))))
         if degrees:
-            return System(-2, own=datum)
+            return System(-2, custom=datum)
         south, zone = divmod(int(geo.get("Projection", 0)) - _UTM_ZONES, 100)
         if south in (0, 1) and 1 <= zone <= 60:
             return described("transverse mercator", utm_zone(zone, south == 1), datum)

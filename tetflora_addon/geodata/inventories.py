@@ -337,11 +337,11 @@ class _Reading:
         self.table, self.units, self.skip = table_, units, skip
         self.good = np.ones(len(table_.numbers), bool)
         self.notes, self.first, self.left_out = list(table_.notes), table_.first, Counter()
-        self.found: dict[str, list[tuple[str, Title]]] = {}
+        self.titles: dict[str, list[tuple[str, Title]]] = {}
         self.used: dict[str, str] = {}
         for title, what in sorted(taken_for(table_, chosen).items(), key=lambda pair: pair[1].doubt):
             if what.field:
-                self.found.setdefault(what.field, []).append((title, what))
+                self.titles.setdefault(what.field, []).append((title, what))
 
     def inventory(self, epsg: int) -> Inventory:
         """The trees of the table; refuses the file or leaves out rows."""
@@ -373,7 +373,7 @@ class _Reading:
 
     def _texts(self, title: str) -> _Texts:
         """Texts of a column, which is one that is used."""
-        self.used[title] = next(name for name, columns in self.found.items() if title in dict(columns))
+        self.used[title] = next(name for name, columns in self.titles.items() if title in dict(columns))
         return self.table.columns[title]
 
     def _each(self, title: str, what: Callable[[str], Any]) -> NDArray[Any]:
@@ -387,7 +387,7 @@ class _Reading:
         if not bad.any():
             return
         index, *more = np.flatnonzero(bad).tolist()
-        title = self.found[column][0][0] if column in self.found else column
+        title = self.titles[column][0][0] if column in self.titles else column
         text = f"{self.table.where(index, title)}: {why(index)}"
         if more:
             also = ", ".join(f"{number:,}" for number in self.table.numbers[more[: _NAMED - 1]].tolist())
@@ -400,14 +400,14 @@ class _Reading:
     def _leave_out(self) -> None:
         """Leave out rows that are no trees, by what stands in place of a species or of their condition."""
         for name in ("status", *NAMES):
-            for title, _ in self.found.get(name, ()):
+            for title, _ in self.titles.get(name, ()):
                 what = self._each(title, partial(_no_tree, condition=name == "status"))
                 self.left_out.update(what[(what != "") & self.good].tolist())
                 self.good &= what == ""
 
     def _size(self, name: str) -> Floats:
         """Sizes in meters, ages in years; 0 for unknown."""
-        read = [(title, what, *cells(self.table.columns[title])) for title, what in self.found.get(name, ())]
+        read = [(title, what, *cells(self.table.columns[title])) for title, what in self.titles.get(name, ())]
         if not read:
             return np.zeros(len(self.good))
         chosen = read[0]
@@ -418,7 +418,7 @@ class _Reading:
                 chosen = other
         title, what, values, units, kinds = chosen
         texts = self._texts(title)
-        self.found[name].sort(key=lambda pair: pair[0] != title)  # messages name the one that counts
+        self.titles[name].sort(key=lambda pair: pair[0] != title)  # messages name the one that counts
         self._refuse(np.isnan(values), name, lambda i: f"{quoted(str(texts[i]))} is not a number")
         words = kinds == WORD
         if words.any():
@@ -429,7 +429,7 @@ class _Reading:
             unit = what.unit or (self._guess(title, name, known) if len(known) else 1.0)
             values = values * np.where(units > 0.0, units, unit)
         elif len(known) and np.median(known) > 1500.0:  # years of planting
-            self.found.setdefault("planted", []).append((title, what))
+            self.titles.setdefault("planted", []).append((title, what))
             return np.zeros(len(self.good))
         beyond = ~((values >= 0.0) & (values <= _MOST[name]))
         limits = f"0 to {_MOST[name]:,.0f} {'years' if name == 'age' else 'm'}"
@@ -452,9 +452,9 @@ class _Reading:
 
     def _since_planting(self) -> Floats:
         """Ages from years of planting, 0 for unknown."""
-        if "planted" not in self.found:
+        if "planted" not in self.titles:
             return np.zeros(len(self.good))
-        title = self.found["planted"][0][0]
+        title = self.titles["planted"][0][0]
         years = self._each(title, lambda text: int(match[0]) if (match := _YEAR.search(text)) else 0)
         now = datetime.date.today().year
         self.notes.append(f'ages from "{title}" to {now}')
@@ -464,7 +464,7 @@ class _Reading:
         """Years since death, 0 for those alive."""
         years = np.zeros(len(self.good))
         for name in ("dead", "status", "name", "common"):
-            for title, _ in self.found.get(name, ()):
+            for title, _ in self.titles.get(name, ()):
                 words = ("dead", "yes") if name == "dead" else ("dead",)
                 says = self._each(title, lambda text, words=words: said_of(text) in words and not species_named(text))
                 values = np.where(says, DEAD_YEARS, 0.0)
@@ -477,7 +477,7 @@ class _Reading:
         name, points, system, pair = self.table.name, self.table.points, self.table.system, ("coordinates",)
         if points is None:
             degrees, meters, one = ("longitude", "latitude"), ("x", "y"), ("place",)
-            pair, *more = [pair for pair in (degrees, meters, one) if self.found.keys() >= set(pair)] or [()]
+            pair, *more = [pair for pair in (degrees, meters, one) if self.titles.keys() >= set(pair)] or [()]
             if not pair:
                 raise SceneError(
                     f"{name}: line 1: no columns of coordinates; name them x and y, or longitude and latitude"
@@ -525,7 +525,7 @@ class _Reading:
 
     def _places(self) -> tuple[Floats, int]:
         """Coordinates that stand in one column, and the EPSG code that stands there too, or 0."""
-        title = self.found["place"][0][0]
+        title = self.titles["place"][0][0]
         texts = self._texts(title)
         places = np.array([place_in(text) for text in texts.tolist()], np.float64).reshape(-1, 3)
         points, plain = places[:, :2], places[:, 2] < 0.0
@@ -540,7 +540,7 @@ class _Reading:
 
     def _coordinate(self, column: str) -> Floats:
         """Numbers (n,) of a column of coordinates, in meters or degrees."""
-        title, what = self.found[column][0]
+        title, what = self.titles[column][0]
         texts = self._texts(title)
         values, _, kinds = cells(texts)
         self._refuse(np.isin(kinds, (NOTHING, WORD)), column, lambda _: "a tree without coordinates")
@@ -550,8 +550,8 @@ class _Reading:
 
     def _names(self) -> tuple[tuple[tuple[str, ...], ...], Integers]:
         """Names of the trees: each combination once, and the index of each tree."""
-        titles = [title for kind in NAMES for title, _ in self.found.get(kind, ())]
-        genera, names = (len(self.found.get(kind, ())) for kind in NAMES[:2])
+        titles = [title for kind in NAMES for title, _ in self.titles.get(kind, ())]
+        genera, names = (len(self.titles.get(kind, ())) for kind in NAMES[:2])
         if not titles:
             self.notes.append("no column of species")
             return ((),), np.zeros(len(self.good), np.int64)

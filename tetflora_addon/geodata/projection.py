@@ -136,7 +136,7 @@ class Definition:
         equal = self.method in ("aea", "laea")
         latitudes = (ell.authalic, ell.of_authalic) if equal else (ell.isometric, ell.of_isometric)
 
-        def there(longitude: Floats, latitude: Floats) -> _Pair:
+        def project(longitude: Floats, latitude: Floats) -> _Pair:
             place = forward(latitudes[0](latitude) + 1j * longitude)
             return (place.imag + east) / self.unit, (place.real + north) / self.unit
 
@@ -144,7 +144,7 @@ class Definition:
             place = backward(y * self.unit - north + 1j * (x * self.unit - east))
             return place.imag, latitudes[1](place.real)
 
-        return there, back, self.parameters[1] + self.meridian
+        return project, back, self.parameters[1] + self.meridian
 
     @property
     def _turned(self) -> Floats:
@@ -333,14 +333,14 @@ class System:
     #: longitude and latitude: the place, degrees.
     longitude: float = 0.0
     latitude: float = 0.0
-    own: Definition | None = field(default=None, repr=False)  # of the file
+    custom: Definition | None = field(default=None, repr=False)  # of the file
     unit: float = 1.0  # meters of plain coordinates, or of those that are taken for meters of the system
 
     @property
     def definition(self) -> Definition:
         """Figures of a system that lies on Earth."""
-        if self.own is not None:
-            return self.own
+        if self.custom is not None:
+            return self.custom
         if self.epsg == -1:
             return _about(self.longitude, self.latitude)
         return known_systems()[self.epsg]
@@ -693,7 +693,7 @@ _SOMEWHERE = (np.array([0.1]), np.array([0.1]))
 
 def _system(definition: Definition) -> System:
     """The system with the same figures that has a code, or one by itself."""
-    return System(code) if (code := _codes().get(_figures(definition))) else System(-2, own=definition)
+    return System(code) if (code := _codes().get(_figures(definition))) else System(-2, custom=definition)
 
 
 @cache

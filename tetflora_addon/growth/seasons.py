@@ -183,7 +183,7 @@ def may_change(rows: Table, row: Integers, year: Floats) -> bool:
 class Stages(Arrays):
     """Stages of leaves (n,)."""
 
-    there: Mask  # (n,): not yet to come and not fallen
+    present: Mask  # (n,): not yet to come and not fallen
     size: Floats  # (n,): over that in summer
     #: fresh, turned and dead, (n,): how far each has the fresh color, that of autumn, and that of dead leaves.
     fresh: Floats

@@ -117,26 +117,26 @@ class _Finer:
 
     def __init__(self, model: LeafModel) -> None:
         self._lock, self._complete = Lock(), model.shape is None
-        self._found = list(_round_levels(model)) if self._complete else []
+        self._levels = list(_round_levels(model)) if self._complete else []
         self._next = _each_level(model)
 
     def until(self, error: float = 0.0, number: int = 1 << 10) -> tuple[list[LeafLevel], bool]:
         """Levels, the coarsest first, up to one within an error or up to a number; and whether these are all."""
         with self._lock:
             # The last one may still give way to the next.
-            while not self._complete and len(self._found) <= number:
-                if any(level.error <= error for level in self._found[:-1]):
+            while not self._complete and len(self._levels) <= number:
+                if any(level.error <= error for level in self._levels[:-1]):
                     break
                 self._add(next(self._next, None))
-            return (self._found if self._complete else self._found[:-1]), self._complete
+            return (self._levels if self._complete else self._levels[:-1]), self._complete
 
     def _add(self, level: LeafLevel | None) -> None:
         if level is None:
             self._complete = True
-        elif self._found and level.model.polygons <= _DEARER * self._found[-1].model.polygons:
-            self._found[-1] = level
+        elif self._levels and level.model.polygons <= _DEARER * self._levels[-1].model.polygons:
+            self._levels[-1] = level
         else:
-            self._found.append(level)
+            self._levels.append(level)
 
 
 @lru_cache(maxsize=128)

@@ -182,7 +182,7 @@ class LightBuffer:
             if len(self):
                 place, behind = self._last_before(taps)
                 depth = np.where(behind, self._up_to(place, taps), 0.0)
-                fragment, has = self._own(taps, cells[part][inside])
+                fragment, has = self._own_fragments(taps, cells[part][inside])
                 # Small ones may overlap; what begins before the last fragment was counted in full.
                 counted = np.where(fragment < place, self._depth[fragment], self._partly(fragment, taps))
                 drawn = np.where(has & (fragment <= place), counted, 0.0)
@@ -268,7 +268,7 @@ class LightBuffer:
         place = np.maximum(place, 0)
         return place, behind & (self._pixel[place] == taps.pixel)
 
-    def _own(self, taps: _Taps, cells: Integers) -> tuple[Integers, Mask]:
+    def _own_fragments(self, taps: _Taps, cells: Integers) -> tuple[Integers, Mask]:
         """Fragment (k, 4) of each point's own tetrahedron in each pixel, and whether there is one."""
         key = cells.astype(np.int64)[:, None] * (self.width * self.height) + taps.pixel
         place = np.searchsorted(self._own_key, key.ravel()).reshape(key.shape)

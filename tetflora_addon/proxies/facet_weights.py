@@ -64,10 +64,10 @@ _KIND = "facet_shares"
 class FacetWeights:
     """Fraction of their area that facets get, by row and number of facets."""
 
-    #: whole and own, (s, r, k): for the first s of `SHARES`, and each of `COUNTS`, of sub-plants, and of what branches
-    #: themselves bear, by the facets of a whole branch.
+    #: whole and branch_only, (s, r, k): for the first s of `SHARES`, and each of `COUNTS`, of sub-plants, and of what
+    #: branches themselves bear, by the facets of a whole branch.
     whole: Floats
-    own: Floats
+    branch_only: Floats
     #: (r,): rows of which a branch has more facets than that: its leaves fill a solid and nothing else grows on it.
     #: Facets reach beyond its surface by a part of their side, so what is missing falls as the root of their number.
     solid: Mask | None = None
@@ -78,7 +78,7 @@ class FacetWeights:
 
     def of_pieces(self, row: Integers, count: Floats, share: Floats | None = None) -> Floats:
         """Weights (n,) for pieces of branches, by rows (n,) and the numbers of facets (n,) of whole branches."""
-        out = _with_share(self.own, row, count, share)
+        out = _with_share(self.branch_only, row, count, share)
         if self.solid is None or not self.solid.any():
             return out
         return np.where(self.solid[row], 1.0 - (1.0 - out) * np.sqrt(COUNTS[-1] / np.maximum(count, COUNTS[-1])), out)
@@ -100,7 +100,7 @@ def _with_share(tables: Floats, row: Integers, count: Floats, share: Floats | No
 
 
 #: Weights (2, r, k) of other species by digest: a scene is compiled anew for each refinement.
-_found: dict[str, Floats] = {}
+_measured: dict[str, Floats] = {}
 
 
 def facet_weights(flora: Flora, species: Collection[int] | None = None) -> FacetWeights:
@@ -142,7 +142,7 @@ def measuring(flora: Flora, species: Collection[int]) -> Generator[tuple[str, fl
             name, content = compiled.species[one].name, digest(compiled, one)
             steps = fitting(compiled, one, RAYS)
             table = yield from mapped(steps, lambda done, i=i, name=name, left=left: (name, (i + done) / len(left)))
-            _found[content] = cached(_KIND, content, table.shape, lambda table=table: table)
+            _measured[content] = cached(_KIND, content, table.shape, lambda table=table: table)
 
 
 def _known(flora: Flora, number: int) -> Floats | None:
@@ -151,12 +151,12 @@ def _known(flora: Flora, number: int) -> Floats | None:
     table = shipped().get(name)
     if table is not None:
         return table.astype(np.float64)
-    if name not in _found:
+    if name not in _measured:
         stored = cached(_KIND, name, (2, int((flora.rows["species"] == number).sum()), len(COUNTS)), lambda: None)
         if stored is None:
             return None
-        _found[name] = stored
-    return _found[name]
+        _measured[name] = stored
+    return _measured[name]
 
 
 def digest(flora: Flora, number: int) -> str:

@@ -371,7 +371,7 @@ def _leaf_colors(flora: Flora, branches: Branches, sites: FacetSites, leaves: Fl
         day, hue = (gathered(branches.year[:, i], sites.owner) for i in range(2))
         stages = leaf_stages(flora.rows, row, sites.key, day)
         one = leaf_colors_at(flora.rows, row, summer, stages, hue)
-        mean = mean + np.where(stages.there, 1.0 / several, 0.0)[:, None] * (one - mean)
+        mean = mean + np.where(stages.present, 1.0 / several, 0.0)[:, None] * (one - mean)
     return np.clip(mean + gathered(flora.rows["leaf_color"][:, 1], row) * deviation[:, None], 0, 1)
 
 

@@ -210,7 +210,7 @@ class SharedParts(Generic[Parts]):
     def _drop_opened(self) -> Parts:
         """All parts, after those that have been opened are dropped and the others numbered anew."""
         if self._parts.marked:
-            present = self._parts.there
+            present = self._parts.unmarked
             part = self._points.rows.part
             part[:] = (np.cumsum(present) - 1).astype(np.int32)[part]
             self._figures = Growing(self._figures.rows.take(present))

@@ -77,7 +77,7 @@ def summarize(
             leaf_moment = own_leaf_moments(flora.orientation, row, axis, outward)
             wood_moment = (np.eye(3) - axis[:, :, None] * axis[:, None, :]) / 2
             transmission = flora.leaf.transmission[row]
-            clumped = clumping.coefficients(branches, clumping.own)
+            clumped = clumping.coefficients(branches, clumping.branch_only)
         leaf, wood = totals.leaf_area, totals.wood_area / 2
         moment = leaf[:, None, None] * leaf_moment + wood[:, None, None] * wood_moment
         color = leaf[:, None] * leaf_color + wood[:, None] * wood_color

@@ -176,8 +176,8 @@ def with_age(species: Species, years: float) -> Species:
 def _crowding(species: Species) -> tuple[float, float]:
     """How crowded branches of young plants are, 0 to 1, and how many live for a while where all of a crown has them."""
     ages = [part * ages_of(species).full for part in _BAREST]
-    crowded = max(round(_Aged(species, years).found("crowded", 1.0), 2) for years in ages)
-    return crowded, max(_Aged(species, years, crowded, 1.0, _FULLER[0]).found("extra", _EXTRA) for years in ages)
+    crowded = max(round(_Aged(species, years).solve_for("crowded", 1.0), 2) for years in ages)
+    return crowded, max(_Aged(species, years, crowded, 1.0, _FULLER[0]).solve_for("extra", _EXTRA) for years in ages)
 
 
 def _scaled(species: Species, factor: float) -> Species:
@@ -240,14 +240,14 @@ class _Aged:
 
     def species(self) -> Species:
         """The species at that age."""
-        out = self._made()
+        out = self._build()
         if self.stem + 1 >= self.last or self.dead:
             return out
         self.thin = min(self.wanted / max(expected_leaf_area(out), 1e-9), _FULLER[self.now[self.stem] >= 1])
         if self.thin == _FULLER[0]:
             self.extra = _crowding(self.one)[1]
-            self.fresh = self.found("fresh", 1.0)
-        return self._made()
+            self.fresh = self.solve_for("fresh", 1.0)
+        return self._build()
 
     @property
     def wanted(self) -> float:
@@ -258,16 +258,16 @@ class _Aged:
         closed = max(self.height / _SMALL, self.ages.heights(self.years))  # low shrubs' crowns at their full height
         return expected_leaf_area(self.one) * leaves * min(closed, 1.0)
 
-    def found(self, name: str, most: float) -> float:
+    def solve_for(self, name: str, most: float) -> float:
         """The value of a number with which leaves are as wanted, or the most that it may be."""
 
         def area(value: float) -> float:
             setattr(self, name, value)
-            return expected_leaf_area(self._made())
+            return expected_leaf_area(self._build())
 
         return bisected(area, self.wanted, most, _STEPS)
 
-    def _made(self) -> Species:
+    def _build(self) -> Species:
         one = self.one
         orders = tuple(self._order(o) for o in range(len(one.orders)))
         spur, dead = one.spur, one.dead

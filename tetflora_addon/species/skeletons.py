@@ -338,7 +338,7 @@ class DrawnBranches:
     radius: Floats  # (k,): meters
     order: Integers32  # (b,): 0 for trunks; at most ``MAX_ORDERS - 1``
     parent: Integers32  # (b,): branch that it grows on; -1 for trunks
-    at: Floats  # (b,): where on the parent it leaves, fraction of the parent's length; 0 for trunks
+    insertion: Floats  # (b,): where on the parent it leaves, fraction of the parent's length; 0 for trunks
     length: Floats  # (b,): along the knots, meters
     #: (b,): from order 2 on, the fraction of the limb's length (its ancestor of order 1) at which that line of branches
     #: leaves it; 0 for trunks and limbs.

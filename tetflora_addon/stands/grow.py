@@ -219,11 +219,11 @@ def grown(
     x, y, radius, base, height = (v[block] for v in (crowns.x, crowns.y, crowns.radius, crowns.base, crowns.height))
     species, taken = one.species, taken[block]
 
-    def own(values: NDArray) -> NDArray:
+    def of_species(values: NDArray) -> NDArray:
         return np.take(values, species)
 
     away = radius + 0.5 * light.cell
-    deep = _BESIDE[0] + (_BESIDE[1] - _BESIDE[0]) * own(traits.crown_conicity)
+    deep = _BESIDE[0] + (_BESIDE[1] - _BESIDE[0]) * of_species(traits.crown_conicity)
     middle = height - deep * np.minimum(height - base, _LONG * height)
     places = ((away, 0.0), (-away, 0.0), (0.0, away), (0.0, -away))
     east, west, north, south = (light.at(x + dx, y + dy, middle, (x, y)) for dx, dy in places)
@@ -233,11 +233,11 @@ def grown(
         below += light.at(x + 0.5 * dx, y + 0.5 * dy, base, (x, y))
     below *= 0.2
 
-    free = np.pi * traits.radii(species, one.basal) ** 2 * own(traits.free)
-    net = taken - own(traits.cost) * crowns.leaves[block]
+    free = np.pi * traits.radii(species, one.basal) ** 2 * of_species(traits.free)
+    net = taken - of_species(traits.cost) * crowns.leaves[block]
     lit = np.clip(net / np.maximum(free, 1e-9), 0.0, 1.5)
     vigor = (1.0 - _RECENT) * one.vigor + _RECENT * lit
-    rate = own(traits.light_use_efficiency) * one.quality * one.strength
+    rate = of_species(traits.light_use_efficiency) * one.quality * one.strength
     basal = one.basal + _increment(one, np.maximum(net, 0.0) * rate, lit, traits)
     dark = 1.0 - np.clip(side, 0.0, 1.0)
     slender = _SLENDER_LIT + (_SLENDER_DARK - _SLENDER_LIT) * dark
@@ -245,14 +245,14 @@ def grown(
     tall = np.maximum(height, slender * short * traits.heights(species, basal))
 
     widest = traits.radii(species, basal)
-    level = _SIDE[0] + (_SIDE[1] - _SIDE[0]) / 5.0 * own(traits.shade)
+    level = _SIDE[0] + (_SIDE[1] - _SIDE[0]) / 5.0 * of_species(traits.shade)
     open_ = np.clip((side - level) / _SIDE_MORE, 0.0, 1.0)
-    closed = np.clip(1.0 - side / (_DARK * own(traits.light_compensation)), 0.0, 1.0)
+    closed = np.clip(1.0 - side / (_DARK * of_species(traits.light_compensation)), 0.0, 1.0)
     widens = np.minimum(widest - traits.radii(species, one.basal) + _WIDENS * (widest - radius), widest - radius)
     wide = radius + np.maximum(widens, 0.0) * open_ - _NARROWS * radius * closed
     wide = np.minimum(wide, widest)
 
-    limit = own(traits.light_compensation)
+    limit = of_species(traits.light_compensation)
     died = np.clip(1.0 - below / limit, 0.0, 1.0) * (tall - height + _RISES * (height - base))
     low = np.minimum(base + died, (1.0 - _SHORTEST) * tall)
     east = one.east + _TURNS * (_offset(east, west) - one.east)

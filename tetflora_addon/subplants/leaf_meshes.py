@@ -379,7 +379,7 @@ class _LeafBearers:
                 kept &= (form != number) | (chosen_level(model, length) == self.step)
         stages = foliage.stages_of(self.flora.rows, self.whole.branches.take(part), owner, key)
         if stages is not None:
-            kept &= stages.there
+            kept &= stages.present
         if kept.all():
             return owner, index, key, form
         kept = np.flatnonzero(kept)

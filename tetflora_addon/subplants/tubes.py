@@ -53,7 +53,7 @@ def tube_buffers(
     vertices, faces = (sum(numbers) for numbers in zip(*(sort.numbers() for sort in sorts), strict=True))
     tubes = _Tubes(vertices, faces, moment(flora.rows) > 0)
     while sorts:
-        for rings, sides, inside in sorts.pop(0).made(flora):
+        for rings, sides, inside in sorts.pop(0).ring_batches(flora):
             tubes.add(flora, rings, sides, inside)
     return tubes.buffers()
 
@@ -86,7 +86,7 @@ class _TubeGroup:
             vertices, faces = vertices + sides * rings, faces + sides * (rings - rings // each)
         return vertices, faces
 
-    def made(self, flora: Flora) -> Iterator[tuple[Rings, int, WholeBranches | None]]:
+    def ring_batches(self, flora: Flora) -> Iterator[tuple[Rings, int, WholeBranches | None]]:
         """Rings, how many vertices they have, and branches within whose bounds they have to stay."""
         if self.fine is None:
             for chunk in chunks(self.rings, _RING_BATCH):

@@ -180,7 +180,7 @@ class TetrahedralTree:
 
     def __init__(self) -> None:
         root = _Nodes.terminal(np.full(1, -1, np.int32), np.zeros(1, np.int16), np.zeros(1, bool))
-        self._nodes, self._made = Growing(root), 0
+        self._nodes, self._placed = Growing(root), 0
         self._inner_by_level: tuple[int, list[Integers]] = (-1, [])
 
     def __len__(self) -> int:
@@ -209,7 +209,7 @@ class TetrahedralTree:
     @property
     def tetrahedra_made(self) -> int:
         """Number of nodes that are tetrahedra, terminal or divided."""
-        return self._made
+        return self._placed
 
     @property
     def levels(self) -> int:
@@ -314,7 +314,7 @@ class TetrahedralTree:
     def place(self, nodes: ArrayLike, vertices: ArrayLike) -> None:
         """Give nodes ``(n,)`` that have none their tetrahedra ``(n, 4, 3)``, positively oriented, meters."""
         self._nodes.rows.vertices[nodes] = vertices
-        self._made += len(np.atleast_1d(nodes))
+        self._placed += len(np.atleast_1d(nodes))
 
     def order(
         self, eye: ArrayLike | None = None, direction: ArrayLike | None = None, back_to_front: bool = False

@@ -138,7 +138,7 @@ def test_a_spline_that_starts_on_another_is_its_branch():
     skeleton = read(add_curve(FORK[:3], [(0.05, 0, 3), (3, 0, 5), (4, 0, 7)], [(3, 0, 5), (3, 2, 6)], kind='BEZIER'))
     found = branches(skeleton)
     np.testing.assert_array_equal(found.order, [0, 1, 2])
-    assert found.at[1] == pytest.approx(3 / 8, abs=0.01)
+    assert found.insertion[1] == pytest.approx(3 / 8, abs=0.01)
 
 
 def test_shape_keys_and_switched_off_curves():

@@ -154,10 +154,10 @@ def test_what_is_wrong_is_told():
 def test_levels_can_be_forgotten():
     scene, _, _ = scene_of_plants()
     preview = compute()
-    made = preview.made
+    changes = preview.changes
     assert bpy.ops.tetflora.preview_levels(clear=True) == {'FINISHED'}
     assert preview.levels is None
-    assert preview.made > made
+    assert preview.changes > changes
     assert not state.is_outdated(scene)
 
 

@@ -157,7 +157,8 @@ def test_clusters_are_lighter_than_fog_and_more_so_in_large_cells() -> None:
     assert (large < small).all()
     assert (large < 0.8).all()
     again = support.compiled(support.shipped("bush"), support.shipped("fern")).clumping
-    np.testing.assert_allclose(again.own[: len(flora.rows)], clumping.own)  # whatever it is compiled with
+    # whatever it is compiled with
+    np.testing.assert_allclose(again.branch_only[: len(flora.rows)], clumping.branch_only)
 
 
 def test_scale_of_a_plant_changes_nothing_in_cells_that_grow_with_it() -> None:
@@ -165,7 +166,8 @@ def test_scale_of_a_plant_changes_nothing_in_cells_that_grow_with_it() -> None:
     clumping = flora.clumping
     one, other = (trunks(flora.rows, support.plants(3, scale=s)) for s in (1.0, 2.5))
     sizes = np.array([0.2**3]), np.array([0.5**3])
-    a, b = (factors(clumping.coefficients(t, clumping.own), v) for t, v in zip((one, other), sizes, strict=True))
+    offset = clumping.branch_only
+    a, b = (factors(clumping.coefficients(t, offset), v) for t, v in zip((one, other), sizes, strict=True))
     np.testing.assert_allclose(a, b)
 
 
@@ -201,7 +203,7 @@ def test_species_without_leaves_and_of_one_order_are_fitted() -> None:
     flag = {**single, "orders": [{"length": [10, 0], "thickness": [0.003, 0], "leaves": 0.5, "leaf_size": [20, 0]}]}
     for data in (bare, single, pole, flag):
         found = support.compiled(data).clumping
-        assert all(np.isfinite(getattr(found, name)).all() for name in ("whole", "own", "root", "density"))
+        assert all(np.isfinite(getattr(found, name)).all() for name in ("whole", "branch_only", "root", "density"))
 
 
 def test_summaries_weigh_factors_by_area() -> None:

@@ -202,7 +202,7 @@ def test_weights_of_solids_are_whole_where_facets_are_as_small_as_leaves() -> No
     assert found[1, 0, 0] < 0.8
     weights = facet_weights(flora)
     many = weights.of_pieces(np.zeros(3, int), np.array([1024.0, 16 * 1024.0, 1e12]))
-    assert many[0] == pytest.approx(weights.own[0, 0, -1])
+    assert many[0] == pytest.approx(weights.branch_only[0, 0, -1])
     assert 1 - many[1] == pytest.approx((1 - many[0]) / 4)
     assert many[2] == pytest.approx(1.0, abs=1e-4)
 

@@ -103,11 +103,11 @@ def test_tables_are_means_of_leaves(leaf: LeafYear, day: float) -> None:
     key = key_of_seed(np.arange(20_000))
     stages = leaf_stages(rows, row, key, np.full(len(key), day))
     found = expected(leaf_table(leaf)[None], np.array([leaf.middle - DAYS / 2]), np.zeros(1, int), np.array([day]))
-    area = np.where(stages.there, stages.size, 0.0) ** 2
+    area = np.where(stages.present, stages.size, 0.0) ** 2
     parts = stages.fresh * (1 - stages.turned) * (1 - stages.dead), stages.turned * (1 - stages.dead), stages.dead
     seen = [
-        stages.there.mean(),
-        np.where(stages.there, stages.size, 0).mean(),
+        stages.present.mean(),
+        np.where(stages.present, stages.size, 0).mean(),
         area.mean(),
         *((area * p).mean() for p in parts),
     ]
@@ -149,7 +149,7 @@ def test_each_leaf_appears_once_and_falls_once() -> None:
     rows = seasonal_rows(flora.rows, flora.species, Season(1.0))
     row = np.flatnonzero(rows["leaves"][:, 0] > 0)[:1]
     key = key_of_seed(np.arange(500))
-    there = np.array([leaf_stages(rows, row, key, np.full(len(key), d)).there for d in np.arange(0.0, 365.0, 1.0)])
+    there = np.array([leaf_stages(rows, row, key, np.full(len(key), d)).present for d in np.arange(0.0, 365.0, 1.0)])
     assert (np.abs(np.diff(there.astype(int), axis=0)).sum(axis=0) == 2).all()
     size = np.array([leaf_stages(rows, row, key, np.full(len(key), d)).size for d in np.arange(100.0, 200.0)])
     assert (np.diff(size, axis=0)[there[100:199]] >= 0).all()
@@ -204,7 +204,7 @@ def test_hues_of_plants_mix_the_colors_of_autumn_as_expected() -> None:
     key = key_of_seed(np.arange(20_000))
     for hue in (0.0, 0.3, 1.0):
         stages = leaf_stages(rows, row, key, np.full(len(key), 270.0))
-        assert stages.there.all()
+        assert stages.present.all()
         hues = np.full(len(key), hue)
         mean = leaf_colors_at(rows, row, np.full((len(key), 3), 0.5), stages, hues).mean(axis=0)
         trunk = support.trunks(rows, support.plants(0))

@@ -200,11 +200,11 @@ def test_a_species_is_looked_at_once(monkeypatch: pytest.MonkeyPatch) -> None:
 
     monkeypatch.setattr(subject, "fitting", noted)
     monkeypatch.setattr(subject, "shipped", dict)
-    monkeypatch.setattr(subject, "_found", {})
+    monkeypatch.setattr(subject, "_measured", {})
     subject._of_states.cache_clear()
     alone = subject.facet_weights(compile_species([load_species("grass")]))
     again = subject.facet_weights(compile_species([load_species("flower"), load_species("grass")]))
     assert asked == ["grass", "flower"]
     rows = alone.whole.shape[1]
     np.testing.assert_array_equal(again.whole[:, -rows:], alone.whole)
-    np.testing.assert_array_equal(again.own[:, -rows:], alone.own)
+    np.testing.assert_array_equal(again.branch_only[:, -rows:], alone.branch_only)

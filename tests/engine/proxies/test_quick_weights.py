@@ -48,7 +48,7 @@ def test_quick_weights_of_an_edited_species_are_those_of_all_rays() -> None:
 
 
 def test_weights_are_measured_in_steps_and_what_is_stopped_leaves_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(subject, "_found", {})
+    monkeypatch.setattr(subject, "_measured", {})
     monkeypatch.setattr(subject, "RAYS", 600.0)
     flora = compile_species([edited("grass", leaves=1.3)])
     fractions = list(subject.fitting(flora, 0, subject.RAYS))

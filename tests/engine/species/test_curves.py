@@ -104,7 +104,7 @@ def test_a_spline_that_starts_on_another_is_its_branch(off: float, backwards: bo
     drawn = drawn_branches(skeleton_from_edges(points[:, :3], points[:, 3], edges, "form", line))
     np.testing.assert_array_equal(drawn.order, [0, 1])
     np.testing.assert_allclose(drawn.length[0], 10)
-    np.testing.assert_allclose(drawn.at[1], 0.33)
+    np.testing.assert_allclose(drawn.insertion[1], 0.33)
     np.testing.assert_allclose(drawn.knots[drawn.first[1]], [0, 0, 3.3])
 
 
@@ -116,9 +116,9 @@ def test_several_splines_on_one_edge_and_on_each_other() -> None:
     points, edges, line = joined_edges(_chains(*splines))
     drawn = drawn_branches(skeleton_from_edges(points[:, :3], points[:, 3], edges, "form", line))
     np.testing.assert_array_equal(drawn.order, [0, 1, 1, 1, 2])
-    np.testing.assert_allclose(np.sort(drawn.at[1:4]), [0.2, 0.5, 0.7])
+    np.testing.assert_allclose(np.sort(drawn.insertion[1:4]), [0.2, 0.5, 0.7])
     np.testing.assert_allclose(drawn.length[[0, 4]], [10, 2])
-    np.testing.assert_allclose([drawn.at[4], drawn.outward[4]], [2 / 3, 2 / 3])
+    np.testing.assert_allclose([drawn.insertion[4], drawn.outward[4]], [2 / 3, 2 / 3])
 
 
 def test_a_trunk_drawn_in_one_stroke_stays_the_trunk() -> None:

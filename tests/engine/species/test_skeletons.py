@@ -66,13 +66,13 @@ def _check_structure(drawn: DrawnBranches) -> None:
     assert (drawn.order[child] == np.minimum(drawn.order[drawn.parent[child]] + 1, MAX_ORDERS - 1)).all()
     assert (np.diff(drawn.first) >= 2).all() and drawn.first[-1] == len(drawn.knots) == len(drawn.radius)
     np.testing.assert_allclose(drawn.length, [_length(chain) for chain in chains], rtol=1e-9)
-    leaves = [_point_at(chains[drawn.parent[b]], drawn.at[b]) for b in child]
+    leaves = [_point_at(chains[drawn.parent[b]], drawn.insertion[b]) for b in child]
     np.testing.assert_allclose(drawn.knots[drawn.first[child]], np.reshape(leaves, (-1, 3)), atol=1e-6)
     for b in range(len(drawn)):
         line = [b]
         while drawn.parent[line[-1]] >= 0:
             line.append(int(drawn.parent[line[-1]]))
-        assert drawn.outward[b] == (drawn.at[line[-3]] if len(line) > 2 else 0.0)
+        assert drawn.outward[b] == (drawn.insertion[line[-3]] if len(line) > 2 else 0.0)
 
 
 def _axes_one_by_one(skeleton: Skeleton) -> list[list[int]]:
@@ -231,7 +231,7 @@ def test_orders_of_a_tree_that_forks_at_known_places() -> None:
     np.testing.assert_array_equal(drawn.order, [0, 1, 2, 3])
     np.testing.assert_array_equal(drawn.parent, [-1, 0, 1, 2])
     np.testing.assert_allclose(drawn.length, [4, 4, 2, 1])
-    np.testing.assert_allclose(drawn.at, [0, 0.5, 0.25, 0.5])
+    np.testing.assert_allclose(drawn.insertion, [0, 0.5, 0.25, 0.5])
     np.testing.assert_allclose(drawn.outward, [0, 0, 0.25, 0.25])
     # The limb tapers by .1 in 3 m, so it had .533 a meter before; one straight piece keeps its radius.
     np.testing.assert_allclose(drawn.radius[drawn.first[:-1]], [1, 0.5 + 0.1 / 3, 0.2, 0.1])

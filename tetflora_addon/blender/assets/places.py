@@ -228,7 +228,7 @@ class _Parts:
             path = (*path, shown)
         if isinstance(shown, bpy.types.Object):
             if not shown.is_instancer or shown.show_instancer_for_render or shown.instance_type == 'COLLECTION':
-                self._own(shown, matrices)
+                self._take_surface(shown, matrices)
             if is_listed(shown):
                 self._one_by_one(shown, matrices)
                 return
@@ -264,9 +264,9 @@ class _Parts:
                 "it is not in the scene; link it to the scene, or make its instances real"
             )
         for shown, places in instances.items():
-            self._own(shown, (matrices[:, None] @ np.array(places)).reshape(-1, 4, 4))
+            self._take_surface(shown, (matrices[:, None] @ np.array(places)).reshape(-1, 4, 4))
 
-    def _own(self, obj: bpy.types.Object, matrices: Floats) -> None:
+    def _take_surface(self, obj: bpy.types.Object, matrices: Floats) -> None:
         """Take the surface of an object itself."""
         if obj.type not in SURFACE_TYPES or is_ours(obj):
             return

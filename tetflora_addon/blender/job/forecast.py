@@ -148,7 +148,7 @@ def _count(scene: Scene, view_layer: ViewLayer) -> Generator[None, None, Stand |
     samples: list[tuple] = [(np.zeros(0), np.zeros((0, 3)), np.zeros(0), np.zeros(0, np.int64))]
     whole = sum(np.sqrt(number) for number, *_ in rows)
     for number, *values in rows:
-        chosen = _some(len(values[0]), max(round(_LOOKED_AT * np.sqrt(number) / whole), 1))
+        chosen = _even_sample(len(values[0]), max(round(_LOOKED_AT * np.sqrt(number) / whole), 1))
         samples.append((np.full(len(chosen), number / len(chosen)), *(one[chosen] for one in values)))
     return Stand(*map(np.concatenate, zip(*samples, strict=True)), tuple(left))
 
@@ -166,13 +166,13 @@ def _in_leaf(scene: Scene, kind: str) -> float:
     return float(expected_of(leaf, np.array([season.northern_day]), PRESENT)[0])
 
 
-def _some(number: int, most: int = _LOOKED_AT) -> Integers:
+def _even_sample(number: int, most: int = _LOOKED_AT) -> Integers:
     return np.linspace(0, number - 1, min(number, most)).round().astype(np.int64)
 
 
 def _plants(scene: Scene, plants: list[Object], carried: Floats) -> tuple[int, Floats, Floats, list[str]]:
     """How many single plants there are; feet, scales and kinds of some."""
-    chosen = [plants[i] for i in _some(len(plants)).tolist()]
+    chosen = [plants[i] for i in _even_sample(len(plants)).tolist()]
     matrices = carried @ np.array([o.matrix_world for o in chosen], dtype=np.float64)
     scale = np.cbrt(np.abs(np.linalg.det(matrices[:, :3, :3])))
     kinds = list(dict.fromkeys(o.tetflora.species for o in chosen))
@@ -192,7 +192,7 @@ def _field(scene: Scene, obj: Object, points: Integers) -> tuple[int, Floats, Fl
     """The same of those points (n,) of a field that are plants now, as stored: nodes are not evaluated yet."""
     kinds = [species_of(kind) for kind in field_kinds(obj)]
     number = len(points)
-    chosen = points[_some(number)]
+    chosen = points[_even_sample(number)]
     matrix = np.array(obj.matrix_world, dtype=np.float64)
     foot = read(obj.data, "position")[chosen].astype(np.float64) @ matrix[:3, :3].T + matrix[:3, 3]
     scale, species, tall = (stored(obj.data, name, chosen) for name in ("scale", "species", HEIGHT))

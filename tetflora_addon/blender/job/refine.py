@@ -248,7 +248,7 @@ def _write_blocks(
         yield
         look = run.results.look_of(block.species)
         obj = yield from run.results.add(name, block.kind, block.buffers, materials[what], species, look)
-        _made(run, obj, block.buffers, lit=True)
+        _record_mesh(run, obj, block.buffers, lit=True)
         text = f"Making polygons: {run.statistics.polygons_meshed:,}"
         return Progress(start + (0.95 - start) * block.fraction, text)
 
@@ -283,13 +283,13 @@ def _write_polygons(run: _Run, blocks: Iterator[PolygonBlock]) -> Job[None]:
         surface, materials = explicit.meshes.surfaces[block.surface], explicit.materials[block.surface]
         name = f"{surface.name} {block.number:03d}"
         obj = yield from run.results.add(name, "explicit", block.buffers, materials, look=surface.look)
-        _made(run, obj, block.buffers, lit=False)
+        _record_mesh(run, obj, block.buffers, lit=False)
         return Progress(0.95, f"Keeping polygons: {run.statistics.polygons_meshed:,}")
 
     yield from written(blocks, write, Progress(0.95, "Keeping polygons"))
 
 
-def _made(run: _Run, obj: bpy.types.Object, buffers: MeshBuffers, lit: bool) -> None:
+def _record_mesh(run: _Run, obj: bpy.types.Object, buffers: MeshBuffers, lit: bool) -> None:
     if run.baking is not None:
         run.baking.add(obj, buffers, lit)
     run.statistics.polygons_meshed += buffers.polygons

@@ -153,7 +153,7 @@ def on_save_pre(_path: object, _other: object = None) -> None:
 
 def on_save_post(_path: object, _other: object = None) -> None:
     """After a file was written: hide and raise it again for a render that goes on."""
-    for collection in _there(_rendering.hidden):
+    for collection in _existing(_rendering.hidden):
         collection.hide_render = True
     for uid in _rendering.raised:
         if (scene := with_uid(bpy.data.scenes, uid)) is not None:
@@ -247,7 +247,7 @@ def _hide(scene: bpy.types.Scene, keys: list[str]) -> None:
     """Hide what results of a render replace, and the artist's own: not before they are made, or there might be none."""
     frame_cache.hide_for(scene, keys)
     _rendering.hidden += [c.session_uid for c in result_collections(scene, 'VIEW') if not c.hide_render]
-    for collection in _there(_rendering.hidden):
+    for collection in _existing(_rendering.hidden):
         collection.hide_render = True
 
 
@@ -269,11 +269,11 @@ def _lower(scene: int) -> None:
 
 
 def _show_hidden() -> None:
-    for collection in _there(_rendering.hidden):
+    for collection in _existing(_rendering.hidden):
         collection.hide_render = False
 
 
-def _there(uids: list[int]) -> list[bpy.types.Collection]:
+def _existing(uids: list[int]) -> list[bpy.types.Collection]:
     return [collection for uid in uids if (collection := with_uid(bpy.data.collections, uid)) is not None]
 
 

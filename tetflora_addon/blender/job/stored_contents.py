@@ -24,7 +24,7 @@ from ..scene.objects import in_parts, may_take_part, objects_within
 from ..species.asset_species import asset_species
 
 # Who is there, and texts, by scene and layer.
-_found: dict[tuple[int, str], tuple[int, dict[str, str]]] = {}
+_contents: dict[tuple[int, str], tuple[int, dict[str, str]]] = {}
 
 
 def stored_contents(scene: Scene, layer: ViewLayer) -> dict[str, str]:
@@ -38,9 +38,9 @@ def stored_contents_steps(scene: Scene, layer: ViewLayer) -> Generator[None, Non
     for obj in in_parts(layer.objects):
         shown[obj.session_uid] = obj.visible_get(view_layer=layer)
         yield
-    if _found.get(key, (None,))[0] != (who := hash((*shown, *shown.values()))):
-        _found[key] = who, (yield from _read(scene, layer, shown))
-    return _found[key][1]
+    if _contents.get(key, (None,))[0] != (who := hash((*shown, *shown.values()))):
+        _contents[key] = who, (yield from _read(scene, layer, shown))
+    return _contents[key][1]
 
 
 def _lineage(obj: Object | None) -> Iterator[Object]:
@@ -91,12 +91,12 @@ def _concerns(update: DepsgraphUpdate) -> bool:
 
 
 def _on_update(_scene: Scene, depsgraph: Depsgraph) -> None:
-    if _found and any(map(_concerns, depsgraph.updates)):
-        _found.clear()
+    if _contents and any(map(_concerns, depsgraph.updates)):
+        _contents.clear()
 
 
 def _forget(*_: object) -> None:
-    _found.clear()
+    _contents.clear()
 
 
 _ANEW = dict.fromkeys(("undo_post", "redo_post", "load_post", "frame_change_post"), _forget)

@@ -74,7 +74,7 @@ class Ingredient:
 class CoverResult:
     """What covering made."""
 
-    made: populations.PlacedPlants
+    placed: populations.PlacedPlants
     bare: list[str]  # grounds that keep a material of the artist's
 
 

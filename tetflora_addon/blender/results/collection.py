@@ -57,7 +57,7 @@ class Results:
     collection: bpy.types.Collection | None = None
 
     def __post_init__(self) -> None:
-        self._made: list[bpy.types.ID] = []
+        self._datablocks: list[bpy.types.ID] = []
         self._names: list[tuple[bpy.types.ID, str]] = []
         self._held: list[bpy.types.ID] = []
         self._shared: dict[Hashable, bpy.types.ID] = {}
@@ -118,7 +118,7 @@ class Results:
             obj = point_object(name, buffers, *materials)
         else:
             mesh = yield from mesh_steps(name, buffers, materials)
-            self._made.append(mesh)
+            self._datablocks.append(mesh)
             obj = bpy.data.objects.new(name, mesh)
         return self.add_object(name, obj, kind, None, species, look)
 
@@ -144,7 +144,7 @@ class Results:
 
     def use(self, materials: Sequence[bpy.types.Material]) -> None:
         """Let TetFlora's materials go with what is made, if it is discarded and nothing else uses them."""
-        self._made += materials
+        self._datablocks += materials
         snow.fit(materials)
 
     def shared(self, key: Hashable, make: Callable[[], _Made]) -> _Made:
@@ -173,7 +173,7 @@ class Results:
             It has a transform and data of its own, which stay; otherwise it counts from the origin.
         """
         datablocks = [obj] if placed else [obj, obj.data]
-        self._made += datablocks
+        self._datablocks += datablocks
         self._names += [(datablock, name) for datablock in datablocks]
         if self.data is not None:
             self.data.add("a part of the result", *datablocks)
@@ -196,7 +196,7 @@ class Results:
         """Add an object to the collection, as the settings have it; Blender then lists all objects anew."""
         if species is not None:
             obj.parent = output.parent_of(self.shown, species.identifier, species.name)
-            self._made.append(obj.parent)
+            self._datablocks.append(obj.parent)
         obj.hide_select = True  # artists select and edit plants, not millions of polygons
         output.dress(self.scene, obj, "" if species is None else species.identifier)
         self.collection.objects.link(obj)
@@ -229,9 +229,9 @@ class Results:
         if self.collection is not None and is_there(self.collection):
             output.remove_collection(self.scene if is_there(self.scene) else None, self.collection)
         self.collection = None
-        output.remove_made([*self._made, *self._held])
+        output.remove_made([*self._datablocks, *self._held])
         self._held = []
-        self._made, self._waiting, self._shared = [], [], {}
+        self._datablocks, self._waiting, self._shared = [], [], {}
 
 
 def dress_results(scene: bpy.types.Scene) -> None:

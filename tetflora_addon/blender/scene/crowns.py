@@ -33,7 +33,7 @@ _prepared: set[Species] = set()
 
 def crown_for(scene: bpy.types.Scene, kind: str) -> Crown:
     """The mean crown of a species at the age of a kind; a guess where it cannot be compiled."""
-    species = _found(scene, kind)
+    species = _species_or_crown(scene, kind)
     try:
         return crown_of(species) if isinstance(species, Species) else species
     except SpeciesError:  # with an object for a leaf
@@ -45,7 +45,7 @@ def crown_to_draw(scene: bpy.types.Scene, kind: str, prepared: bool = False) -> 
 
     prepared: how finely its leaves may be drawn has to be known as well.
     """
-    species = _found(scene, kind)
+    species = _species_or_crown(scene, kind)
     if _in_background() or isinstance(species, Crown):
         return crown_for(scene, kind)
     if species in _without:
@@ -101,7 +101,7 @@ def _find_all(species: Iterable[Species], find: Callable[[Species], object]) -> 
             _without.add(one)
 
 
-def _found(scene: bpy.types.Scene, kind: str) -> Species | Crown:
+def _species_or_crown(scene: bpy.types.Scene, kind: str) -> Species | Crown:
     """A species at the age of a kind; the crown itself of what is an asset, missing or broken."""
     asset = find_asset(scene, species_of(kind))
     if asset is not None:

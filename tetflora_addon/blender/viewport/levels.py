@@ -86,7 +86,7 @@ def level_steps(data: JobData) -> Generator[Progress, None, Levels]:
     data.check()
     preview = of(scene)
     preview.levels, preview.looked = levels, looked
-    preview.made += 1
+    preview.changes += 1
     if scene.tetflora.preview.freeze:
         preview.frozen = camera
     redraw()
@@ -107,7 +107,7 @@ def read_shapes(scene: Scene, depsgraph: Depsgraph) -> Shapes | None:
         preview.shapes, preview.message = None, str(error)
     except TetFloraError as error:
         preview.message = str(error)
-    preview.made, preview.running = preview.made + 1, None
+    preview.changes, preview.running = preview.changes + 1, None
     preview.seconds = time.thread_time() - begin
     redraw()
     return preview.shapes
@@ -261,7 +261,7 @@ def _follow(scene: Scene, depsgraph: Depsgraph, preview: Preview, views: Sequenc
     of_all = len(running.seeds) + sum(one.of for one in others)
     preview.shapes = replace(joined(parts) if parts[1:] else parts[0], of=of_all) if parts else None
     preview.moment = _moment(scene)
-    preview.made += 1
+    preview.changes += 1
     redraw('WINDOW')
 
 

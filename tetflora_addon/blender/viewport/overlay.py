@@ -221,11 +221,11 @@ def _draw(overlay: gpu.types.GPUBatch | None, origin: Floats, shader: gpu.types.
 
 def _draw_plants(preview: Preview) -> None:
     shapes = preview.shapes
-    mesh, near = _kept(preview, "plants", (preview.made,), lambda: plants(shapes)), None
+    mesh, near = _kept(preview, "plants", (preview.changes,), lambda: plants(shapes)), None
     if shapes.crowns is not None:
         region = bpy.context.region_data
         place = region.view_matrix.inverted().translation if region.is_perspective else region.view_location
-        key = preview.made, *(round(part) for part in place)  # another meter shows others
+        key = preview.changes, *(round(part) for part in place)  # another meter shows others
         name = f"near {bpy.context.space_data.as_pointer()}"
         closest, least, eye = _kept(preview, name, key, lambda: (*nearest(shapes, np.array(place)), np.array(place)))
         near = _kept(preview, f"{name} faces", key, lambda: plants(closest))
@@ -236,14 +236,14 @@ def _draw_plants(preview: Preview) -> None:
         _draw(one, shapes.origin, _faces_shader())
     gpu.state.face_culling_set('NONE')
     if shapes.crowns is not None:
-        _draw_points(_kept(preview, "points", (preview.made,), lambda: points(preview)), shapes.origin, eye, least)
+        _draw_points(_kept(preview, "points", (preview.changes,), lambda: points(preview)), shapes.origin, eye, least)
     gpu.state.depth_mask_set(False)
 
 
 def _draw_levels(preview: Preview, settings: TetFloraPreview, space: bpy.types.SpaceView3D) -> None:
     levels, level = preview.levels, preview.levels.at(settings.level)
     forms = frozenset(settings.forms)
-    shown = (preview.made, level.number, forms)
+    shown = (preview.changes, level.number, forms)
     origin = levels.camera.origin
     gpu.state.blend_set('ALPHA')
     gpu.state.depth_test_set('LESS_EQUAL')
@@ -282,7 +282,7 @@ def _reach(preview: Preview, camera: Camera) -> float:
         depth = camera.counted_from(preview.levels.camera.origin).to_camera_space(middles)[:, 2]
         return float(min(max(depth.max(initial=1.0), 1.0), camera.far))
 
-    return _kept(preview, "reach", (preview.made, *_place(camera)), farthest)
+    return _kept(preview, "reach", (preview.changes, *_place(camera)), farthest)
 
 
 def _place(camera: Camera) -> tuple[float, ...]:
@@ -335,12 +335,12 @@ def _guarded(draw: Callable[[bpy.types.Context, Preview], None]) -> None:
     preview = state.find(context.scene)
     if preview is None or not context.space_data.overlay.show_overlays:
         return
-    if preview.cache.get("broken") == preview.made:
+    if preview.cache.get("broken") == preview.changes:
         return
     try:
         draw(context, preview)
     except Exception:
-        preview.cache["broken"] = preview.made
+        preview.cache["broken"] = preview.changes
         print("TetFlora: cannot draw the preview; please report this as a bug:", file=sys.stderr)
         traceback.print_exc()
     finally:

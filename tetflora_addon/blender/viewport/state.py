@@ -61,7 +61,7 @@ class Preview:
     running: Running | None = None  # what is read once while the timeline runs
     message: str = ""  # why plants cannot be shown; empty if they can
     seconds: float = 0.0  # of the processor that reading them took
-    made: int = 0  # counts changes of levels and shapes, to know what the graphics card already has
+    changes: int = 0  # counts those of levels and shapes, to know what the graphics card already has
     cache: dict = field(default_factory=dict)  # what the overlay keeps
 
 
@@ -84,7 +84,7 @@ def forget(scene: bpy.types.Scene) -> None:
     preview = find(scene)
     if preview is not None:
         preview.levels, preview.looked = None, ()
-        preview.made += 1
+        preview.changes += 1
     redraw()
 
 
@@ -138,7 +138,7 @@ def plants_wanted(scene: bpy.types.Scene) -> None:
     if scene.tetflora.preview.plants == 'NONE':
         preview = of(scene)
         preview.shapes, preview.message = None, ""
-        preview.made += 1
+        preview.changes += 1
         redraw()
     else:
         listeners.notify()
