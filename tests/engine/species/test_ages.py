@@ -16,7 +16,9 @@ from devtools import sizes
 from tests.engine import support
 from tetflora_addon.compiled.flora import Flora, compile_species
 from tetflora_addon.errors import SpeciesError
+from tetflora_addon.growth.growth import children, trunks
 from tetflora_addon.growth.rows import DEAD_ORDER
+from tetflora_addon.growth.seeds import Seeds
 from tetflora_addon.species.ages import STAGES, ages_of, stage, with_age
 from tetflora_addon.species.catalog import load_species, species_from_dict
 from tetflora_addon.species.members import expected_leaf_area, expected_members, expected_polygons
@@ -107,6 +109,32 @@ def test_a_young_tree_is_no_small_old_one(name: str) -> None:
         assert young[0].length.mean < 0.6 * old[0].length.mean
         assert young[0].thickness.mean < 1.2 * old[0].thickness.mean
         assert young[0].branch_start.mean <= old[0].branch_start.mean + 1e-9
+
+
+@pytest.mark.parametrize("name", ["spruce", "larch"])
+@pytest.mark.parametrize("part", [0.2, 0.4])
+def test_young_conifers_are_cones(name: str, part: float) -> None:
+    """Limbs in the middle are over half as long as at the foot, and the top is no more crowded than half-way to it."""
+    flora = at_age(name, part * ages_of(load_species(name)).full)
+    plants = trunks(flora.rows, Seeds.upright(12))
+    limbs, owner = children(flora.rows, plants)
+    high, long = limbs.position[:, 2] / plants.length[owner], limbs.length / plants.length[owner]
+    foot, middle, top = ((low < high) & (high < low + 0.2) & ~flora.rows["dead"][limbs.row] for low in (0.0, 0.4, 0.8))
+    foot_long, middle_long = (float((long[part] ** 2).sum() / long[part].sum()) for part in (foot, middle))
+    assert middle_long > 0.55 * foot_long
+    assert top.sum() < 1.1 * middle.sum()
+
+
+@pytest.mark.parametrize("name", ["scots_pine", "rowan"])
+def test_twigs_of_young_trees_are_leafy(name: str) -> None:
+    """What leaves a small tree has are on fewer twigs, and not a few on each of many."""
+    species = load_species(name)
+    on_twigs = []
+    for one in (with_age(species, 0.2 * ages_of(species).full), species):
+        members = expected_members(one)
+        long = float(np.prod([order.length.mean for order in one.orders]))
+        on_twigs.append(members.leaves[-1] / members.branches[-1] / long)
+    assert on_twigs[0] > 0.3 * on_twigs[1]
 
 
 def test_stages_follow_one_another() -> None:
