@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from ..arrays import Arrays, Floats, Integers, Keys, Table, by_component, columns, cross, gathered
 from .hashing import Draw, signed
-from .rows import ranged, varied
+from .rows import FADED, ranged, varied
 from .seeds import Branches
 from .wind import axis_and_angle, is_windy, leaned, moment, sway, turned_by, turned_vectors
 
@@ -188,9 +188,6 @@ def _pulled(frame: Floats, pull: Floats, sky: Floats | None = None) -> Floats:
     return out
 
 
-FLARE_END, FLARE_FALL = 1 / 8, 8 * np.log(100.0)  # the flare falls to a hundredth over the first eighth
-
-
 def profile(rows: Table, row: NDArray, key: Keys, t: Floats, summed: bool = False) -> NDArray:
     """Radius (n,) at fractions t (n,) of branches of rows (n,) and keys (n,), divided by that of the base unflared.
 
@@ -211,9 +208,10 @@ def profile(rows: Table, row: NDArray, key: Keys, t: Floats, summed: bool = Fals
         out[piped] = np.minimum(place, start) + fallen if summed else left**q
     flared = np.flatnonzero(rows["flare"][row] > 0)
     if len(flared):
-        end = np.minimum(t[flared], FLARE_END) if summed else t[flared]
-        fall = np.exp(-FLARE_FALL * end)
-        more = (1 - fall) / FLARE_FALL - 0.01 * end if summed else np.maximum(fall - 0.01, 0)
+        fall = rows["fall"][row[flared]]
+        end = np.minimum(t[flared], FADED / fall) if summed else t[flared]
+        left = np.exp(-fall * end)
+        more = (1 - left) / fall - 0.01 * end if summed else np.maximum(left - 0.01, 0)
         out[flared] += rows["flare"][row[flared]] * more
     return out
 

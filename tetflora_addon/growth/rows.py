@@ -306,6 +306,7 @@ _FORMS = {
 }  # fmt: skip
 #: Where a flared base gets rings of its own, fractions of the length; as far as they lie on the first segment.
 FLARE_RINGS = (0.012, 0.035, 0.08)
+FADED, FLARE_FALL = np.log(100.0), 8 * np.log(100.0)  # the flare falls to a hundredth over the first eighth
 # A fork that no pipe model describes keeps the cross-section.
 _FORK_POWER = 2.0
 
@@ -315,7 +316,7 @@ ROW_DTYPE = np.dtype(
     + [("envelope", np.int64), ("envelope_radius", np.float64), ("inclination", np.int64)]
     + [("next", np.int32, (4,)), ("count", np.float64, (4, 2)), ("start", np.float64, (4, 2))]
     + [("fraction", np.float64, (4, 2)), ("part", np.float64, (2,))]
-    + [("growing", np.float64, (4, 12)), ("settled", np.float64)]
+    + [("growing", np.float64, (4, 12)), ("settled", np.float64), ("fall", np.float64)]
     + [("ramps", np.float64, (2,)), ("least", np.float64)]
     + [("nominal", np.float64), ("pipe_radius", np.float64), ("fork_power", np.float64)]
     + [("continues", np.bool_), ("outward", np.bool_), ("tropic", np.bool_), ("gradient", np.bool_)]
@@ -337,7 +338,7 @@ sub-plants whose shape depends on how they stand to the sky; ``gradient`` leaves
 inside and outside, or old and young; ``sunlit`` leaves that turn to the sky otherwise outside than inside; ``exact``
 plants that are all the same; ``dead`` branches that are broken off or bare. Of axes that are not full-grown ``growing``
 says where children of each sort are, ``settled`` and ``ramps`` are those of `species.PartGrown`, and ``least`` is the
-vigor below which a branch is new, or about to die.
+vigor below which a branch is new, or about to die. A flare falls as e^(-``fall`` t).
 
 A plant whose form is drawn by hand begins with a ``phantom`` row: a branch without wood, whose children are the
 ``drawn`` rows from the first to before the last of ``drawn_rows``. Each of these is one branch with ``knots`` (meters,
@@ -475,7 +476,7 @@ def _row(order: Order, species: int, number: int) -> np.void:
     row["fraction"], row["part"], row["nominal"] = (0, 1), (0, 1), 1
     if order.pipe > 0:
         row["pipe"] = max(order.pipe, 1.0)
-    row["fork_power"] = row["pipe"] or _FORK_POWER
+    row["fork_power"], row["fall"] = row["pipe"] or _FORK_POWER, FLARE_FALL
     row["rings"] = _flare_rings(row)
     return row
 
@@ -537,6 +538,9 @@ def _part(row: np.void, order: Order, p: int, low: float, high: float, before: f
         # As wide at its base as what it comes from, or the fork would be an open pipe.
         row["whorl"], row["continues"] = 1, True
         row["flare"] = expected_forks(order.forks) ** (1 / row["fork_power"]) - 1
+        if row["order"] == 0:  # not within less than its own radius, or at an angle it would still be an open pipe
+            base = order.thickness.mean * radius[0] * (1 + row["flare"]) ** (1 - p)
+            row["fall"] = np.clip(length / base, FADED, FLARE_FALL)
     else:
         row["length"] *= length
         if row["order"] == 0:  # whose thickness is a fraction of its length

@@ -88,9 +88,8 @@ def with_quality(species: Species, quality: float) -> Species:
     # Sides and segments as real numbers make the count continuous; once they are whole, members make up for it.
     detail = bisected(lambda d: expected_polygons(thinned(_shapes(species, members, d), d)), target, *_BISECTED)
     shapes = [(round(k), round(s)) for k, s in _shapes(species, members, detail)]
-    return _kept(
-        species, thinned(shapes, bisected(lambda d: expected_polygons(thinned(shapes, d)), target, *_BISECTED))
-    )
+    detail = bisected(lambda d: expected_polygons(thinned(shapes, d)), target, *_BISECTED)
+    return _kept(species, thinned(shapes, detail))
 
 
 def _tiers(species: Species) -> list[Order]:

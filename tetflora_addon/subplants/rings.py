@@ -24,11 +24,11 @@ from numpy.typing import NDArray
 from ..arrays import Arrays, Floats, Floats32, Integers, Keys, Mask, Table, cross, dot, smoothstep, spread, unit
 from ..compiled.averages import tube_perimeter
 from ..compiled.flora import Flora, bounds
-from ..growth.axes import FLARE_FALL, Axes
+from ..growth.axes import Axes
 from ..growth.foliage import leaf_keys, leaf_places, place_leaves
 from ..growth.growth import WholeBranches, branch_counts, leaf_counts, radius_at
 from ..growth.hashing import Draw, child_key, uniform
-from ..growth.rows import FORK, SPUR_ORDER, ranged
+from ..growth.rows import FLARE_FALL, FORK, SPUR_ORDER, ranged
 from ..growth.seeds import Branches
 
 #: Pixels by which a tube may be off the round and bent branch that it stands for.
@@ -319,10 +319,9 @@ def foot_rings(flora: Flora, whole: WholeBranches, fine: Fineness) -> tuple[Ring
 
 def _falls(rows: Table, branches: Branches, segments: Integers) -> Floats:
     """Over how many of its own lengths the base of a branch falls to its usual thickness in the first segment (n,)."""
-    step = branches.length / segments
     more, length = collars(rows, branches)
-    flared = rows["flare"][branches.row] > 0
-    return np.where(flared, FLARE_FALL / segments, np.where(more > 0, 2.0 * step / length, 0.0))
+    grown = np.where(more > 0, 2.0 * branches.length / length, 0.0)
+    return np.where(rows["flare"][branches.row] > 0, rows["fall"][branches.row], grown) / segments
 
 
 def _stretched(x: Floats, fall: Floats) -> Floats:

@@ -20,12 +20,14 @@ from hypothesis import strategies as st
 
 from tests.engine import support
 from tetflora_addon.arrays import chunks, spread
-from tetflora_addon.compiled.flora import Flora
+from tetflora_addon.compiled.flora import Flora, compile_species
 from tetflora_addon.growth.axes import axes
 from tetflora_addon.growth.foliage import _face_light, leaf_keys, leaf_places, place_leaves
-from tetflora_addon.growth.growth import branch_counts, children, chosen_children, leaf_counts, trunks
+from tetflora_addon.growth.growth import branch_counts, children, chosen_children, leaf_counts, radius_at, trunks
 from tetflora_addon.growth.rows import DEAD, FORK, SPUR
 from tetflora_addon.growth.seeds import Branches, Seeds
+from tetflora_addon.species.ages import with_age
+from tetflora_addon.species.catalog import load_species
 from tetflora_addon.subplants.pieces import Pieces, open_subplants
 
 TABLE = Path(__file__).resolve().parents[2] / "data" / "plants.json"
@@ -169,6 +171,23 @@ def test_moving_a_plant_moves_it() -> None:
     _, here = support.grown(flora, support.plants(3))
     _, there = support.grown(flora, support.plants(3, position=(10, -5, 2)))
     np.testing.assert_allclose(here.end + (10, -5, 2), there.end, atol=1e-12)
+
+
+@pytest.mark.parametrize("years", [0.0, 80.0, 300.0])
+def test_stems_cover_the_rim_of_the_trunk_that_forks(years: float) -> None:
+    """Where a stem comes out of the end of its trunk, on the side to which it leans, it is as far out as the rim."""
+    rows = compile_species([with_age(load_species("oak"), years)]).rows
+    own = trunks(rows, Seeds.upright(24))
+    counts = branch_counts(rows, own, FORK)
+    owner, index = spread(counts)
+    stems = chosen_children(rows, own, axes(rows, own), owner, index, counts, FORK)
+    rim = radius_at(rows, own, np.ones(len(own)))[owner]
+    top = axes(rows, own).at(owner, np.ones(len(owner)))[1][:, :, 2]
+    lean = np.arccos(np.clip(np.einsum("ni,ni->n", stems.frame[:, :, 2], top), -1.0, 1.0))
+    way = np.linspace(0.0, 2.0, 200)[:, None] * rim
+    radius = np.array([radius_at(rows, stems, t) for t in np.minimum(way / stems.length, 1.0)])
+    out = np.argmax(way * np.cos(lean) >= radius * np.sin(lean), axis=0)
+    assert (radius[out, np.arange(len(stems))] / np.cos(lean) > 0.9 * rim).all()
 
 
 def test_frames_stay_rotations_and_branches_keep_their_length() -> None:
