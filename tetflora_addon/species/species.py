@@ -122,7 +122,7 @@ class Nodes(NamedTuple):
         return NodeLaw(self.begin, self.end, self.power, self.whole * number, self.below * number)
 
     def ends(self, law: NodeLaw, start: float, now: float) -> tuple[float, float, float]:
-        """Places of the first, first short-lived and last node on axes ``now`` long, of which ``start`` is bare."""
+        """First, first short-lived and last place, see `NodeLaw`, on axes ``now`` long, ``start`` of which is bare."""
         first, top = law.number_at(np.array([start, self.until]) * now)
         last = first + self.kept * (top - first)
         return start * now, *law.place_of([last - self.fresh * (last - first), last]).tolist()
@@ -162,7 +162,7 @@ def some_nodes(law: NodeLaw, ends: ArrayLike, extra: float) -> tuple[Floats, Flo
 
 
 def faded(place: Floats, first: ArrayLike, long: ArrayLike, extra: Mask) -> Floats:
-    """Factor (n,) on lengths of laterals at places (n,): those that live for a while are on so long a part from one."""
+    """Factors (n,) on lengths of laterals at places (n,): the short-lived are on a part ``long`` from ``first`` on."""
     part = (place - first) / np.maximum(long, 1e-9)
     return np.where(extra, np.clip(np.minimum(part / _FADING, (1 - part) / (1 - _FADING)), 0, 1), 1.0)
 
