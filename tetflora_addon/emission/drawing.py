@@ -361,9 +361,9 @@ class _Tile(Canvas):
         ranks = [rank(what, one) for what, one in shapes.items()]
         kept = np.ones(sum(map(len, ranks)), bool)
         kept[np.argsort(np.concatenate(ranks), kind="stable")[: int(np.ceil(number))]] = False
-        self._facets.clear()
+        self._facets, self.meshes = {}, {}
         for (what, one), stay in zip(shapes.items(), np.split(kept, np.cumsum([*map(len, ranks)])[:-1]), strict=True):
-            if isinstance(one, MeshBuffers):
+            if isinstance(one, MeshBuffers) and stay.any():
                 self.meshes[what] = [kept_faces(one, stay)]
             elif stay.any():
                 self._facets[what] = [one.take(np.flatnonzero(stay))]

@@ -15,6 +15,7 @@ import pytest
 from tests.engine import support
 from tests.engine.emission.test_emission import scene
 from tests.engine.refinement.test_loop import run
+from tetflora_addon.buffers import MeshBuffers
 from tetflora_addon.camera.camera import Camera
 from tetflora_addon.emission import drawing as subject
 from tetflora_addon.emission.budget import fit_to_budget
@@ -332,6 +333,46 @@ def test_a_budget_holds(share: float) -> None:
     """To the last primitive, however tight it is; and most of it is used."""
     most = int(share * number_of())
     assert 0.5 * most < number_of(most) <= most
+
+
+def sides_of_faces(mesh: MeshBuffers, camera: Camera) -> np.ndarray:
+    """Roots of the areas of all faces, in pixels."""
+    corners, size = corners_of_faces(mesh)
+    edges = np.diff(corners.astype(np.float64), axis=1)
+    area = 0.5 * np.linalg.norm(np.cross(edges.cumsum(axis=1)[:, :-1], edges[:, 1:]).sum(axis=1), axis=1)
+    middle = (corners.sum(axis=1) - (corners.shape[1] - size)[:, None] * corners[:, -1]) / size[:, None]
+    return np.sqrt(area) / camera.extent_around(middle)
+
+
+def test_what_nobody_sees_is_left_out_first(monkeypatch: pytest.MonkeyPatch) -> None:
+    """As many as asked: facets that nobody sees, then the smallest faces, and facets that are seen at last."""
+    leave_out, camera = subject._Tile._leave_out, wood()[2]
+    kept = []
+
+    def contents(tile: subject._Tile) -> tuple[np.ndarray, np.ndarray]:
+        pixels = [np.zeros(0), *(sides_of_faces(mesh, camera) for meshes in tile.meshes.values() for mesh in meshes)]
+        facets = {seen: sum(map(len, group)) for (_, seen), group in tile._facets.items()}
+        sides = np.sort(np.concatenate(pixels))
+        return np.array([facets.get(False, 0), len(sides), facets.get(True, 0)]), sides
+
+    def leave_more_out(tile: subject._Tile, _: float) -> None:
+        facets, meshes = dict(tile._facets), dict(tile.meshes)
+        kept.append(contents(tile))
+        for step, number in enumerate(kept[0][0]):
+            tile._facets, tile.meshes = dict(facets), dict(meshes)
+            leave_out(tile, kept[0][0][:step].sum() + 0.5 * number)
+            kept.append(contents(tile))
+
+    monkeypatch.setattr(subject._Tile, "_leave_out", leave_more_out)
+    monkeypatch.setattr("tetflora_addon.processes.pool.number", lambda *_: 0)
+    support.drawn(wood()[0], wood()[3], camera, 1.2, 0.6)
+    before, sides = kept[0]
+    assert min(before) > 100
+    for step, (after, left) in enumerate(kept[1:4]):
+        assert np.all(after[:step] == 0)
+        assert after[step] == before[step] // 2
+        assert np.all(after[step + 1 :] == before[step + 1 :])
+        np.testing.assert_allclose(left, sides[len(sides) - len(left) :], rtol=1e-4)
 
 
 def test_plants_before_a_ground_are_as_fine_as_before_the_sky() -> None:
