@@ -173,6 +173,23 @@ def test_limbs_whose_first_is_not_known_where_it_is_are_inside_the_bound(
     assert outside(flora, support.trunks(flora.rows, support.plants(np.arange(4)))) < _FLOAT32
 
 
+@pytest.mark.parametrize("angle", [0, 45, 90, 135])
+def test_bounds_of_straight_limbs_are_as_large_as_the_plant(angle: float) -> None:
+    """Without curves and variation there is nothing to allow for: a bound a twentieth smaller would cut them."""
+    straight = {"curvature": [0, 0], "curvature_tip": 0, "attraction": [0, 0]}
+    trunk_order = {**straight, "length": [1, 0], "branches": [20, 0], "branch_start": [0.2, 0], "crown": "cylindrical"}
+    limb_order = {**straight, "length": [0.8, 0], "angle": [angle, 0], "angle_tip": angle, "branches": [0, 0]}
+    flora = support.compiled(support.small(order0=trunk_order, order1={**limb_order, "leaves": [0, 0]}))
+    trunk = support.trunks(flora.rows, support.plants(np.arange(1)))
+    assert outside(flora, trunk) < _FLOAT32
+    (*_, radius, half, pad), *_ = (bodies := bounding_capsules(flora, trunk)).T
+    from_center = vertices(flora, trunk) - bodies[:3, 0]
+    along = from_center @ bodies[3:6, 0]
+    across = np.linalg.norm(from_center - along[:, None] * bodies[3:6, 0], axis=1)
+    assert across.max() > 0.95 * (radius + pad)
+    assert np.ptp(along) > 0.95 * 2.0 * (half + pad)
+
+
 @pytest.mark.parametrize("whorl", [2, 3])
 def test_whorls_are_inside_the_bound(whorl: int) -> None:
     """Branches and leaves that share their places."""
