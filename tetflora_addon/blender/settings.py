@@ -184,10 +184,8 @@ def check_limits(group: bpy.types.PropertyGroup, owner: str) -> None:
             numbers = value if getattr(prop, "is_array", False) else (value,)
             sound, limits = all(prop.hard_min <= n <= prop.hard_max for n in numbers), limits_of(prop)
         if not sound:
-            raise SceneError(
-                f"{readable(owner)}: {prop.name} is {quoted(value)}; it must be {limits}. Set it again in the TetFlora "
-                "tab of the sidebar"
-            )
+            told = f"{readable(owner)}: {prop.name} is {quoted(value)}"
+            raise SceneError(f"{told}; it must be {limits}. Set it again in its TetFlora panel")
 
 
 _CELLS = properties_of(ViewCells)
