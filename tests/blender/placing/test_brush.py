@@ -232,6 +232,39 @@ def test_rays_find_the_nearest_ground_of_many():
     assert (bent.matrix_world.inverted() @ place).z == pytest.approx(3.0, abs=1e-4)
 
 
+@pytest.mark.parametrize("closed", ["field", "eye", "excluded", "species"])
+def test_what_would_not_be_seen_is_not_painted(closed):
+    add_mesh("ground", size=40.0)
+    _brush(store='FIELD')
+    _stroke()
+    field = _field()
+    (home,) = (c for c in bpy.context.view_layer.layer_collection.children if field.name in c.collection.objects)
+    before, mix = len(_places(field)), bpy.context.scene.tetflora.populate.mix
+
+    def close(on):
+        if closed == "field":
+            field.hide_set(on)
+        elif closed == "eye":
+            home.hide_viewport = on
+        elif closed == "excluded":
+            home.exclude = on
+        elif on:
+            bpy.context.scene.tetflora.layers.clear()
+            mix.add().species = "gone_tree"
+        else:
+            mix.clear()
+
+    _brush(store='FIELD', source='MIX' if closed == "species" else 'ONE')
+    close(True)
+    told = {"field": f'"{field.name}" is hidden', "species": "Unknown species"}
+    with pytest.raises(RuntimeError, match=told.get(closed, f'"{home.name}" is hidden')):
+        _stroke(places=[(0.0, 12.0, 0.0)])
+    assert len(_places(field)) == before
+    close(False)
+    _stroke(places=[(0.0, 12.0, 0.0)])
+    assert len(_places(field)) > before
+
+
 def test_settings_that_cannot_work_are_told_and_change_nothing():
     add_mesh("ground", size=30.0)
     _brush(radius=1000.0, density=1000.0)
