@@ -232,37 +232,34 @@ def test_rays_find_the_nearest_ground_of_many():
     assert (bent.matrix_world.inverted() @ place).z == pytest.approx(3.0, abs=1e-4)
 
 
-@pytest.mark.parametrize("closed", ["field", "eye", "excluded", "species"])
-def test_what_would_not_be_seen_is_not_painted(closed):
+def test_plants_of_a_field_that_is_hidden_are_left_alone_and_others_are_seen():
     add_mesh("ground", size=40.0)
     _brush(store='FIELD')
     _stroke()
-    field = _field()
-    (home,) = (c for c in bpy.context.view_layer.layer_collection.children if field.name in c.collection.objects)
-    before, mix = len(_places(field)), bpy.context.scene.tetflora.populate.mix
-
-    def close(on):
-        if closed == "field":
-            field.hide_set(on)
-        elif closed == "eye":
-            home.hide_viewport = on
-        elif closed == "excluded":
-            home.exclude = on
-        elif on:
-            bpy.context.scene.tetflora.layers.clear()
-            mix.add().species = "gone_tree"
-        else:
-            mix.clear()
-
-    _brush(store='FIELD', source='MIX' if closed == "species" else 'ONE')
-    close(True)
-    told = {"field": f'"{field.name}" is hidden', "species": "Unknown species"}
-    with pytest.raises(RuntimeError, match=told.get(closed, f'"{home.name}" is hidden')):
-        _stroke(places=[(0.0, 12.0, 0.0)])
-    assert len(_places(field)) == before
-    close(False)
+    hidden = _field()
+    before = len(_places(hidden))
+    hidden.hide_set(True)
     _stroke(places=[(0.0, 12.0, 0.0)])
-    assert len(_places(field)) > before
+    (new,) = (o for o in bpy.data.objects if o.tetflora.is_field and o != hidden)
+    assert new.visible_get()
+    assert len(_places(new)) > 0
+    assert len(_places(hidden)) == before
+    _stroke(places=[(0.0, -12.0, 0.0)])
+    assert sum(o.tetflora.is_field for o in bpy.data.objects) == 2
+
+
+def test_a_species_that_is_no_more_is_not_painted_but_can_be_erased():
+    add_mesh("ground", size=40.0)
+    _brush()
+    _stroke()
+    before, settings = len(_plants()), _brush(source='MIX', strength=1.0)
+    bpy.context.scene.tetflora.populate.mix.add().species = "gone_tree"
+    with pytest.raises(RuntimeError, match='Unknown species "gone_tree"; choose one of'):
+        _stroke()
+    assert len(_plants()) == before
+    assert settings.strokes == 1
+    _stroke('ERASE')
+    assert _plants() == []
 
 
 def test_settings_that_cannot_work_are_told_and_change_nothing():

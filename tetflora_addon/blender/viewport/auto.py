@@ -160,8 +160,7 @@ def _still_good(scene: bpy.types.Scene, now: Camera | None) -> bool:
 
 def _away(scene: bpy.types.Scene) -> float:
     """Meters to what a viewport turns around."""
-    viewport = viewport_of(scene)
-    return viewport[0].region_3d.view_distance if viewport else 1.0
+    return viewport[0].region_3d.view_distance if (viewport := viewport_of(scene)) else 1.0
 
 
 def schedule(scene: bpy.types.Scene, by_view: bool = False) -> None:
@@ -351,8 +350,7 @@ def on_frame(scene: bpy.types.Scene, _depsgraph: object = None) -> None:
     """Another frame: in the wind all plants have moved, and it may be another day or year."""
     if _state.working or not scene.tetflora.auto_refine:
         return
-    moves = wind_of(scene) is not None or season_of(scene) is not None or years_of(scene) > 0.0
-    if moves or stand_years(scene):
+    if wind_of(scene) is not None or season_of(scene) is not None or years_of(scene) > 0.0 or stand_years(scene):
         schedule(scene)
 
 
