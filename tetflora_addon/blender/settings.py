@@ -114,6 +114,11 @@ def rules_of(layer: bpy.types.PropertyGroup) -> bpy.types.PropertyGroup:
     return layer.field.tetflora.stand if layer.kind == FIELD and layer.field is not None else layer
 
 
+def named(layer: bpy.types.PropertyGroup) -> bpy.types.PropertyGroup | bpy.types.Object:
+    """What has the name by which artists know a layer: itself, or the field that it shows."""
+    return layer.field if layer.kind == FIELD and layer.field is not None else layer
+
+
 def active_in(owner: bpy.types.PropertyGroup, entries: str) -> bpy.types.PropertyGroup | None:
     """The active entry of a list of an owner; None without one."""
     groups, index = getattr(owner, entries), getattr(owner, f"{entries}_index")

@@ -196,6 +196,15 @@ def test_switched_off_it_keeps_what_is_there_and_stops(scene, monkeypatch):
     assert len(results(scene)) == 1
 
 
+def test_where_no_plant_is_left_the_line_says_no_more_than_fits(scene, monkeypatch):
+    """What to do was behind it: Blender cut the middle of both."""
+    for plant in [o for o in scene.objects if o.tetflora.is_plant]:
+        bpy.data.objects.remove(plant)
+    scene.tetflora.auto_refine = True
+    settle(monkeypatch)
+    assert auto.message() == "No plants to render"
+
+
 def test_what_cannot_be_refined_is_said(scene, monkeypatch):
     bpy.data.objects["tree 0"].tetflora.species = "quercus"
     scene.tetflora.auto_refine = True

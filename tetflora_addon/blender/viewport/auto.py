@@ -228,7 +228,8 @@ def tick() -> float | None:
     except Exception as error:
         expected = isinstance(error, TetFloraError)
         _state.steps, more = None, False
-        _state.message = str(error) if expected else f"unexpected error, please report it as a bug: {error!r}"
+        said = str(error).partition("; ")[0]  # the panel has a line
+        _state.message = said if expected else f"unexpected error, please report it as a bug: {error!r}"
         redraw()
         if not expected:
             raise
