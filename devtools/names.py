@@ -21,8 +21,8 @@ _HEAD = """<!-- SPDX-FileCopyrightText: 2026 TetFlora Authors -->
 
 # Names
 
-These identifiers do not change, as files and scripts use them. `python -m devtools.names` writes this table, and a
-test holds it; a name that has to change needs a step in `tetflora_addon/formats.py`.
+Files and scripts use these identifiers, so they do not change. `python -m devtools.names` writes this page, and a test
+compares it with the code. A name that must change needs a step in `tetflora_addon/formats.py`.
 """
 #: Where scripts find groups of properties.
 _PLACES = {"TetFloraObject": "`Object.tetflora`", "TetFloraScene": "`Scene.tetflora`"}
