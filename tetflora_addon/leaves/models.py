@@ -42,11 +42,11 @@ _DIRECTIONS, _CELLS = 16, 32  # directions of silhouettes, and cells along each 
 class Spines:
     """Spines on a closed body; lengths are fractions of the leaf's."""
 
-    distance: float = limited(0.1, 0.03, 1, "distance of areoles, from which spines grow")
-    number: int = limited(2, 1, 12, "spines of an areole")
+    distance: float = limited(0.1, 0.03, 1, "distance between areoles, from which spines grow")
+    number: int = limited(2, 1, 12, "spines per areole")
     length: float = limited(0.07, 0.005, 1, "length of a spine")
     thickness: float = limited(0.003, 0.0005, 0.05, "thickness of a spine at its base")
-    lean: float = limited(35.0, 0, 85, "angle between a spine and what is perpendicular to the leaf, degrees")
+    lean: float = limited(35.0, 0, 85, "angle between a spine and the leaf's normal, degrees")
 
 
 @dataclass(frozen=True, eq=False)

@@ -159,20 +159,20 @@ _PROFILES = (
 class Needles:
     """Needles around one shoot or several; lengths are fractions of the whole."""
 
-    needles: int = limited(100, 4, 400, "needles, all together")
-    bundle: int = limited(1, 1, 5, "needles that stand together: 2, 3 or 5 in pines")
+    needles: int = limited(100, 4, 400, "number of needles")
+    bundle: int = limited(1, 1, 5, "needles per bundle: 2, 3 or 5 in pines")
     length: float = limited(0.16, 0.01, 1, "length of a needle")
-    thickness: float = limited(0.012, 0.001, 0.1, "thickness of a needle before it is given the area of the far form")
+    thickness: float = limited(0.012, 0.001, 0.1, "thickness of a needle, before it is fitted to the distant form")
     angle: float = limited(50.0, 0, 120, "angle between shoot and needle at the base of the shoot, degrees")
     angle_tip: float = limited(25.0, 0, 120, "the same at its tip")
     flat: float = limited(0.3, 0, 1, "0: needles all around the shoot, 1: in one plane")
     bend: float = limited(0.12, -0.5, 0.5, "how far needles bend toward the tip of the shoot, fraction of their length")
-    shoot: float = limited(0.9, 0.01, 1, "length of a shoot that bears them")
+    shoot: float = limited(0.9, 0.01, 1, "length of a shoot")
     shoots: int = limited(1, 1, 12, "shoots, spread as a fan")
     spread: float = limited(0.0, 0, 180, "angle between the outer shoots of a fan, degrees")
-    lift: float = limited(0.0, 0, 1, "how far shoots of a fan stand out of its plane in turns")
+    lift: float = limited(0.0, 0, 1, "how far shoots of a fan alternate out of its plane")
     stem: float = limited(0.016, 0.001, 0.1, "thickness of a shoot")
-    turn: float = limited(0.0, -180, 180, "turn of the whole about its axis, degrees")
+    turn: float = limited(0.0, -180, 180, "turn of the whole leaf about its axis, degrees")
 
     @property
     def gap(self) -> float:
@@ -452,10 +452,10 @@ class Compound:
     leaflet: Blade = described(Blade(), "outline of a leaflet, as of a simple leaf")
     pairs: int = limited(6, 0, 40, "pairs of leaflets; 0 for leaflets around a point")
     around: int = limited(0, 0, 12, "leaflets around a point, as petals or the leaflets of a chestnut")
-    circle: float = limited(360.0, 30, 360, "angle that leaflets around a point take up, degrees")
+    circle: float = limited(360.0, 30, 360, "angle that leaflets around a point span, degrees")
     terminal: int = limited(1, 0, 1, "1: a leaflet at the tip")
-    first: float = limited(0.2, 0, 0.95, "where on the rachis the first pair sits, or the point around which they are")
-    last: float = limited(0.85, 0.02, 1, "where the last pair sits")
+    first: float = limited(0.2, 0, 0.95, "place on the rachis of the first pair, or of the point within the leaflets")
+    last: float = limited(0.85, 0.02, 1, "place of the last pair on the rachis")
     length: float = limited(0.28, 0.01, 1, "length of the longest leaflets")
     longest: float = limited(0.5, 0, 1, "which pair is the longest: 0 the first, 1 the last")
     ends: float = limited(0.7, 0.02, 1, "length of the shortest leaflets over that of the longest")
