@@ -19,7 +19,7 @@ export OPENBLAS_NUM_THREADS = 1
 unexport PYTHONDONTWRITEBYTECODE
 export PYTHONPYCACHEPREFIX = $(CURDIR)/out/pycache
 
-.PHONY: help environment demo results test quick test-lts lint build bench docs-images clean
+.PHONY: help environment environment-lts demo results collect test quick test-lts lint build bench docs-images clean
 .DEFAULT_GOAL := help
 
 help:
@@ -38,6 +38,9 @@ help:
 	@echo 'Set BLENDER=/path/to/blender and run .ci/run for the tests in a full Blender.'
 
 environment: $(VENV)/.ready
+
+environment-lts:
+	@$(MAKE) --no-print-directory environment VENV='$(LTS_VENV)' VERSIONS='$(LTS_VERSIONS)'
 
 $(VENV)/.ready: pyproject.toml devtools/environment.py
 	@python=$$(sh devtools/find_python.sh $(VERSIONS)) && "$$python" -m devtools.environment $(VENV)
@@ -64,6 +67,10 @@ test: environment
 	$(KEEPING) $(PY) -m pytest -q -n 2 $(BY_FILE) $(ENGINE_TESTS) || code=1; \
 	$(PY) -m pytest -q -n 2 $(BY_FILE) $(BLENDER_TESTS) || code=1; \
 	exit $$code
+
+# What both processes of each run do first, once for both.
+collect: environment
+	@$(PY) -m pytest -qq --collect-only $(ENGINE_TESTS) && $(PY) -m pytest -qq --collect-only $(BLENDER_TESTS)
 
 # While editing: what has not taken long in the last run, of the rules, the engine and the add-on. About a minute.
 quick: environment

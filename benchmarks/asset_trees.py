@@ -267,7 +267,11 @@ def _sprig(size: int, leaves: int, rng: np.random.Generator, dark: tuple, light:
         t, side = 0.05 + 0.82 * n / (leaves - 1), 1 if n % 2 else -1
         angle = np.radians(0.0 if n == leaves - 1 else rng.uniform(42, 68)) * side
         long = (0.16 if n == leaves - 1 else rng.uniform(0.28, 0.36)) * (1.0 - 0.3 * t)
-        x, y = u - 0.03 * np.sin(5 * t), v - t
+        # Only near it: no leaf is wider than a third of its length.
+        stem = 0.03 * np.sin(5 * t)
+        rows, columns = (np.rint((np.array([-1.1, 1.1]) * long + at) * size).astype(int) for at in (t, stem + 0.5))
+        near = np.s_[slice(*rows.clip(0, size)), slice(*columns.clip(0, size))]
+        x, y = u[near] - stem, v[near] - t
         along, across = np.sin(angle) * x + np.cos(angle) * y, np.cos(angle) * x - np.sin(angle) * y
         s = along / long
         width = 0.27 * long * np.sin(np.pi * np.clip(s, 0, 1) ** 0.85)
@@ -275,8 +279,8 @@ def _sprig(size: int, leaves: int, rng: np.random.Generator, dark: tuple, light:
         vein = 1.0 + 0.35 * np.exp(-((across / (0.01 * 1.5)) ** 2)) + 0.12 * np.cos(60 * s + 220 * np.abs(across))
         mix = np.clip(t + 0.2 * rng.uniform(-1, 1) + 0.25 * (s - 0.5), 0, 1)[..., None]
         leaf = (dark + (light - dark) * mix) * vein[..., None] * rng.uniform(0.85, 1.1)
-        color = np.where(inside[..., None] > 0, leaf, color)
-        alpha = np.maximum(alpha, inside)
+        color[near] = np.where(inside[..., None] > 0, leaf, color[near])
+        alpha[near] = np.maximum(alpha[near], inside)
     return np.concatenate([np.clip(color, 0, 1), alpha[..., None]], axis=2)
 
 

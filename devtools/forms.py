@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tetflora_addon.arrays import spread
+from tetflora_addon.arrays import gathered, spread
 from tetflora_addon.compiled.flora import Flora, compile_species
 from tetflora_addon.growth.foliage import leaf_forms, leaf_keys, leaf_places, place_leaves, settled
 from tetflora_addon.growth.growth import WholeBranches, leaf_counts, radius_at, trunks
@@ -159,14 +159,15 @@ def measures(flora: Flora, seed: int) -> dict[str, float]:
     parts = list(expand(flora, plant))
     leaves = [group for part in parts for group in _leaves(flora, part)]
     knots = np.concatenate([part.knots(flora.rows)[2] for part in parts])
-    place, area, normal = (np.concatenate(arrays) for arrays in list(zip(*leaves, strict=True))[:3])
+    place = np.concatenate([group[0] for group in leaves])
+    of_leaf = np.concatenate([group[1].sum(axis=0) for group in leaves])
+    area, angle = (np.concatenate([group[i].ravel() for group in leaves]) for i in (1, 2))
     length, width, number = (np.array(values) for values in list(zip(*leaves, strict=True))[3:])
     height = float(max(place[:, 2].max(), knots[:, 2].max()))
     at = np.minimum(BREAST_HEIGHT / plant.length, 1.0)
     diameter = 2.0 * float(radius_at(flora.rows, plant, at)[0])
     crown_width = _across(place)
     depth = float(np.ptp(place[:, 2]))
-    angle = np.degrees(np.arccos(np.clip(np.abs(normal[:, 2]), 0.0, 1.0)))
     mean = float(np.average(angle, weights=area))
     low, high = _limb_angles(flora, parts)
     longest = float(np.average(length, weights=number))
@@ -177,7 +178,7 @@ def measures(flora: Flora, seed: int) -> dict[str, float]:
         "slenderness": height / diameter,
         "crown_width": crown_width,
         "crown_spread": crown_width / height,
-        "crown_base": _base(place[:, 2], area) / height,
+        "crown_base": _base(place[:, 2], of_leaf) / height,
         "angle_low": low,
         "angle_high": high,
         "leaf_length": 100.0 * longest,
@@ -202,7 +203,9 @@ def _alone(flora: Flora, seed: int) -> Seeds:
 
 
 def _leaves(flora: Flora, whole: WholeBranches) -> Iterator[tuple[NDArray, NDArray, NDArray, float, float, int]]:
-    """Of the green leaves on branches, form by form: places, areas and normals of faces, mean length, width, number."""
+    """Of the green leaves on branches, form by form: places (n, 3), areas and angles (faces, n) to the sky of their
+    faces, in m² and degrees, mean length, width, and number.
+    """
     rows = flora.rows
     green = rows["leaf_kind"][whole.branches.row] == LEAF_KINDS.index("leaf")
     for row in np.unique(whole.branches.row[green]):
@@ -223,13 +226,12 @@ def _leaves(flora: Flora, whole: WholeBranches) -> Iterator[tuple[NDArray, NDArr
                 continue
             size, faces = leaves.size[own], model.face_vectors
             areas = np.linalg.norm(faces, axis=1)
-            vectors = np.einsum("nij,fj->nfi", frame[own], faces / np.maximum(areas, 1e-30)[:, None])
-            middle = np.array([np.mean(model.positions, axis=0)])
-            place = leaves.position[own, None] + size[:, None, None] * np.einsum("nij,fj->nfi", frame[own], middle)
-            place = np.repeat(place, len(faces), axis=1).reshape(-1, 3)
+            turned, middle = gathered(frame, own), np.mean(model.positions, axis=0)
+            up = np.abs(faces / np.maximum(areas, 1e-30)[:, None] @ turned[:, 2].T)
+            place = gathered(leaves.position, own) + size[:, None] * (turned @ middle)
             long, wide = model.positions[:, 1].max(), np.ptp(model.positions[:, 0])
-            area = (size[:, None] ** 2 * areas).reshape(-1)
-            yield place, area, vectors.reshape(-1, 3), size.mean() * long, size.mean() * wide, len(own)
+            angle = np.degrees(np.arccos(np.clip(up, 0.0, 1.0)))
+            yield place, areas[:, None] * size**2, angle, size.mean() * long, size.mean() * wide, len(own)
 
 
 def _across(place: NDArray[np.float64]) -> float:

@@ -20,6 +20,7 @@ PAGES = (
     "docs/manual/*.md",
     "docs/features.md",
     "docs/results.md",
+    "docs/measurements.md",
     "docs/release/*.md",
     "docs/extension-page.md",
 )

@@ -19,7 +19,7 @@ from ..tetflora_addon.blender.placing.first_forest import is_startup
 from ..tetflora_addon.blender.placing.populations import PlacedPlants, make_plants_steps, remove_layer, reroll_steps
 from ..tetflora_addon.blender.placing.rules import active_population, briefly, grounds_of, grounds_seen, set_grounds
 from ..tetflora_addon.blender.runtime import is_there
-from ..tetflora_addon.blender.settings import BIOME, FIELD, SCATTER, rules_of, with_identity
+from ..tetflora_addon.blender.settings import BIOME, FIELD, SCATTER, named, rules_of, with_identity
 from ..tetflora_addon.blender.species.edits import grow_in_wood
 from ..tetflora_addon.blender.stands import growing
 from ..tetflora_addon.blender.viewport import points
@@ -149,7 +149,7 @@ class TETFLORA_OT_update_layers(_InParts, Operator, label="Update", needs=_ACTIV
             layer = with_identity(scene.tetflora.layers, uid)
             if layer is None:
                 continue
-            name = layer.name
+            name = named(layer).name
             try:
                 with closing(self._steps_of(depsgraph, layer, uids[number + 1 :])) as steps:
                     one = yield from part_of(steps, number / len(uids), (number + 1) / len(uids), name)
@@ -171,7 +171,7 @@ class TETFLORA_OT_update_layers(_InParts, Operator, label="Update", needs=_ACTIV
     ) -> Job[PlacedPlants | growing.GrownStand]:
         if layer.kind == FIELD:
             if not growing.is_stand(layer.field):
-                raise SceneError(f'"{layer.name}" has no rules to grow again by; use the brush, or edit its points')
+                raise SceneError(f'"{layer.field.name}" has no rules to grow by; use the brush or edit its points')
             populations.refuse_frozen(layer)
             if self.reroll:
                 layer.field.tetflora.stand.seed += 1
@@ -262,7 +262,7 @@ class TETFLORA_OT_duplicate_layer(Reporting, Operator, label="Duplicate Layer", 
             return self.failed("Select a mesh to copy the layer to")
         layer = layers.copy_layer(context.scene, layers.active_layer(context.scene), grounds)
         points.schedule()
-        return self.done(f'"{layer.name}" added; click Update to grow it')
+        return self.done(f'"{named(layer).name}" added; click Update to grow it')
 
 
 class TETFLORA_OT_remove_layer(Reporting, Operator, label="Remove Layer", needs=_ACTIVE):
@@ -272,7 +272,7 @@ class TETFLORA_OT_remove_layer(Reporting, Operator, label="Remove Layer", needs=
 
     def run(self, context: bpy.types.Context) -> set[str]:
         scene, layer = context.scene, layers.active_layer(context.scene)
-        name, number = layer.name, 0
+        name, number = named(layer).name, 0
         if layer.kind == BIOME and not self.keep_plants:
             number = adding.remove_biome(scene, layer)
         else:

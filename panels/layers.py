@@ -12,7 +12,7 @@ from ..tetflora_addon.blender.placing.distances import follows_species, suggesti
 from ..tetflora_addon.blender.placing.rules import grounds_seen
 from ..tetflora_addon.blender.scene.crowns import crown_to_draw
 from ..tetflora_addon.blender.scene.fields import has_history
-from ..tetflora_addon.blender.settings import BIOME, FIELD, SCATTER, active_in, rules_of
+from ..tetflora_addon.blender.settings import BIOME, FIELD, SCATTER, active_in, named, rules_of
 from ..tetflora_addon.blender.viewport import points
 from . import base
 
@@ -35,11 +35,10 @@ class TETFLORA_UL_layers(bpy.types.UIList):
             row.prop(item, "folded", text="", emboss=False, icon='RIGHTARROW' if item.folded else 'DOWNARROW_HLT')
         elif item.biome:
             row.separator()
-        named = item.field if item.kind == FIELD and item.field is not None else item
         handle = row.row()
         handle.scale_x, icon = (0.5, 'GRIP') if kind == GROUP else (1.0, kind)  # what it is, and where it is dragged
         base.Button("move_layer", icon, "", {"direction": 'DRAG', "layer": item.uid}).draw(handle, emboss=False)
-        row.prop(named, "name", text="", emboss=False)
+        row.prop(named(item), "name", text="", emboss=False)
         right = row.row(align=True)
         right.alignment = 'RIGHT'
         due = is_due(item)  # then the number is about to change, and names need the room

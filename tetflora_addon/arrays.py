@@ -66,8 +66,7 @@ def bilinear(values: NDArray[np.floating], place: NDArray[np.floating]) -> Float
     (x, y), (right, above) = low.T, np.minimum(low + 1, (columns - 1, rows - 1)).T
     part, rise = (place - low).T
     bottom = values[y, x] * (1.0 - part) + values[y, right] * part
-    top = values[above, x] * (1.0 - part) + values[above, right] * part
-    return bottom * (1.0 - rise) + top * rise
+    return bottom * (1.0 - rise) + (values[above, x] * (1.0 - part) + values[above, right] * part) * rise
 
 
 def smoothstep(x: Floats, low: float = 0.0, high: float = 1.0) -> Floats:
@@ -165,8 +164,7 @@ def gathered(array: NDArray, index: NDArray | slice) -> NDArray:
 def spread(counts: Integers) -> tuple[Integers, Integers]:
     """Owner (m,) and running index within the owner (m,) for ``counts`` things each; m is their sum."""
     owner = np.repeat(np.arange(len(counts)), counts)
-    first = np.cumsum(counts) - counts
-    return owner, np.arange(len(owner)) - first[owner]
+    return owner, np.arange(len(owner)) - (np.cumsum(counts) - counts)[owner]
 
 
 def chunks(counts: NDArray, limit: float) -> Iterator[slice]:
@@ -269,7 +267,7 @@ def unit(a: NDArray) -> NDArray:
 
 def perpendicular(axis: NDArray) -> NDArray:
     """A unit vector (n, 3) across each of unit vectors (n, 3), turned about it as may be."""
-    return unit(np.cross(axis, np.where(np.abs(axis[:, 2:]) < 0.9, [[0.0, 0.0, 1.0]], [[1.0, 0.0, 0.0]])))
+    return unit(cross(axis, np.where(np.abs(axis[:, 2:]) < 0.9, [[0.0, 0.0, 1.0]], [[1.0, 0.0, 0.0]])))
 
 
 def spiral(z: NDArray, index: NDArray, step: float = GOLDEN_ANGLE) -> NDArray:

@@ -85,6 +85,13 @@ class Range(NamedTuple):
         return factor
 
 
+def altered(record: Declared, **changes: Any) -> Declared:
+    """`dataclasses.replace` for one whose fields are all there is to it: half of the time of an age went into that."""
+    out = object.__new__(type(record))
+    vars(out).update(vars(record), **changes)
+    return out
+
+
 class Color(NamedTuple):
     """A linear color that differs from leaf to leaf: mean ± variation, all channels together."""
 

@@ -252,7 +252,9 @@ def face_vectors(mesh: MeshBuffers) -> NDArray[np.float64]:
     points = points - origin  # float32 far from the origin would drown in the product
     following = np.roll(points, -1, axis=0)
     following[last] = points[first]
-    return 0.5 * np.add.reduceat(np.cross(points, following), first, axis=0)
+    (ax, ay, az), (bx, by, bz) = np.ascontiguousarray(points.T), np.ascontiguousarray(following.T)
+    vectors = ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx  # np.cross takes four times as long
+    return np.stack([0.5 * np.add.reduceat(vector, first) for vector in vectors], axis=1)
 
 
 def face_areas(mesh: MeshBuffers) -> NDArray[np.float64]:

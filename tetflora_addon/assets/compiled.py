@@ -186,8 +186,7 @@ def compile_steps(source: AssetSource) -> Generator[float, None, Asset]:
 def _smallest(hierarchy: Hierarchy) -> tuple[Integers, Integers]:
     """Clusters (k,) without children, in their order, and which of these each cluster has: (2, c), first and end."""
     small = hierarchy.smallest
-    ends = [np.searchsorted(hierarchy.first[small], of) for of in (hierarchy.first, hierarchy.last)]
-    return small, np.stack(ends)
+    return small, np.stack([np.searchsorted(hierarchy.first[small], of) for of in (hierarchy.first, hierarchy.last)])
 
 
 def _clusters(hierarchy: Hierarchy, parts: list[Measured]) -> tuple[Clusters, SurfaceSamples]:

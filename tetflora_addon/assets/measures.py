@@ -181,8 +181,7 @@ def measured(run: Run) -> Measured:
     first = np.flatnonzero(run.new_face)
     low = np.minimum.reduceat(run.corners.min(axis=1), start, axis=0)
     high = np.maximum.reduceat(run.corners.max(axis=1), start, axis=0)
-    leaves = _leaves(run, optical, normal)
-    return Measured(low, high, sums, samples, counts, leaves, run.part[first], run.face[first])
+    return Measured(low, high, sums, samples, counts, _leaves(run, optical, normal), run.part[first], run.face[first])
 
 
 def _leaves(run: Run, optical: Floats, normal: Floats) -> AssetKites:
@@ -265,8 +264,7 @@ def _samples(
         look = (array[pick] for array in (normal, run.color, run.transmission, run.roughness))
         samples.append(SurfaceSamples.typed(place, *look))
         order.append(cluster)
-    cluster = np.concatenate(order)
-    return SurfaceSamples.concatenate(samples).take(np.argsort(cluster, kind="stable")), counts
+    return SurfaceSamples.concatenate(samples).take(np.argsort(np.concatenate(order), kind="stable")), counts
 
 
 def through_both_sides(

@@ -114,6 +114,11 @@ def rules_of(layer: bpy.types.PropertyGroup) -> bpy.types.PropertyGroup:
     return layer.field.tetflora.stand if layer.kind == FIELD and layer.field is not None else layer
 
 
+def named(layer: bpy.types.PropertyGroup) -> bpy.types.PropertyGroup | bpy.types.Object:
+    """What has the name by which artists know a layer: itself, or the field that it shows."""
+    return layer.field if layer.kind == FIELD and layer.field is not None else layer
+
+
 def active_in(owner: bpy.types.PropertyGroup, entries: str) -> bpy.types.PropertyGroup | None:
     """The active entry of a list of an owner; None without one."""
     groups, index = getattr(owner, entries), getattr(owner, f"{entries}_index")
@@ -184,10 +189,8 @@ def check_limits(group: bpy.types.PropertyGroup, owner: str) -> None:
             numbers = value if getattr(prop, "is_array", False) else (value,)
             sound, limits = all(prop.hard_min <= n <= prop.hard_max for n in numbers), limits_of(prop)
         if not sound:
-            raise SceneError(
-                f"{readable(owner)}: {prop.name} is {quoted(value)}; it must be {limits}. Set it again in the TetFlora "
-                "tab of the sidebar"
-            )
+            told = f"{readable(owner)}: {prop.name} is {quoted(value)}"
+            raise SceneError(f"{told}; it must be {limits}. Set it again in its TetFlora panel")
 
 
 _CELLS = properties_of(ViewCells)

@@ -458,8 +458,7 @@ class DayTotals:
 
     def left(self, branches: Branches, kind: int | Integers, *columns: int) -> list[Floats]:
         """What is left of leaves of a kind, or of kinds (n,), on the days of branches (n): some columns (n,)."""
-        which = self.table[branches.row, kind]
-        return seasons.expected(self.tables, self.origin, which, branches.year[:, 0], columns)
+        return seasons.expected(self.tables, self.origin, self.table[branches.row, kind], branches.year[:, 0], columns)
 
     def _summed(self, subplants: Branches, each: Floats, column: int, kind: int | None = None) -> Floats:
         """Sum (n,) over kinds of leaves, or of one, of what they have in summer (n, k) and the day leaves."""
@@ -517,8 +516,7 @@ class DayTotals:
         count = self.count[subplants.row]
         every, left = count.sum(axis=1), self._summed(subplants, count, seasons.PRESENT)
         size = self._summed(subplants, count, seasons.SIZE) / np.maximum(left, 1e-300)
-        share = left / np.maximum(every, 1e-300)
-        return np.where(every > 0, bare + share * (leaf * size - bare), leaf)
+        return np.where(every > 0, bare + (left / np.maximum(every, 1e-300)) * (leaf * size - bare), leaf)
 
     def share_range(self, rows: Table, species: int) -> tuple[float, float]:
         """Least and greatest `leaf_share` of plants of a species on the day of rows (r,)."""

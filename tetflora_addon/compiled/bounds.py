@@ -31,8 +31,7 @@ def _axis_envelope(row: Table) -> tuple[NDArray, NDArray, NDArray, NDArray]:
     joint[0] = widest_sway(row) / segments  # the first segment sets out straight, but for the wind
     turn = np.minimum(np.cumsum(joint), np.pi)
     radius = np.concatenate([[0], np.cumsum(np.sin(np.minimum(turn, np.pi / 2)) / segments)])
-    low = np.concatenate([[0], np.cumsum(np.cos(turn)) / segments])
-    return radius, low, np.linspace(0, 1, segments + 1), turn
+    return radius, np.concatenate([[0], np.cumsum(np.cos(turn)) / segments]), np.linspace(0, 1, segments + 1), turn
 
 
 def _joint_turns(row: Table) -> Floats:
@@ -206,8 +205,7 @@ def _unit_bound(rows: Table, index: int, bounds: Floats, raised: bool) -> Floats
 def _crown_most(row: Table, low: Floats, high: Floats) -> Floats:
     """Greatest length ratio of children between two fractions (n,) of them."""
     inner = np.linspace(low, high, 5, axis=1)
-    ratio = crown_ratio(row["crown"], 1 - inner).max(axis=1)
-    return np.minimum(ratio + _CROWN_SLOPE * (high - low) / 8, 1)
+    return np.minimum(crown_ratio(row["crown"], 1 - inner).max(axis=1) + _CROWN_SLOPE * (high - low) / 8, 1)
 
 
 def sampled_bounds(parts: Sequence[Points], rows: int) -> Floats:

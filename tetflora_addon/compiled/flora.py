@@ -116,12 +116,12 @@ class Flora:
     @_in_summer
     def samples(self) -> Samples:
         """Points on the leaves and wood of sub-plants."""
-        return self.samples_of(range(len(self.rows)))
+        return self.samples_of(range(len(self.rows)), 1)[0]
 
-    def samples_of(self, sampled: Container[int], times: int = 1) -> Samples:
-        """Samples of some rows alone, and so many times as many, of plants in summer."""
+    def samples_of(self, sampled: Container[int], *times: int) -> list[Samples]:
+        """Samples of some rows alone, so many times as many each, of plants in summer."""
         totals = self.averages
-        return draw_samples(self.rows, totals.leaf_area[:, 1], _wood_totals(totals), totals.length, sampled, times)
+        return draw_samples(self.rows, totals.leaf_area[:, 1], _wood_totals(totals), totals.length, sampled, *times)
 
     @_in_summer
     def of_several_kinds(self) -> Integers:
@@ -136,7 +136,7 @@ class Flora:
         totals, sampled = self.averages, np.flatnonzero(np.isin(self.rows["species"], self.of_several_kinds))
         areas = ((kind, totals.leaf_area[:, 1] * (self.rows["leaf_kind"] == kind)) for kind in range(len(LEAF_KINDS)))
         given = _wood_totals(totals), totals.length, sampled, 1
-        return {kind: draw_samples(self.rows, area, *given) for kind, area in areas if area[sampled].any()}
+        return {kind: draw_samples(self.rows, area, *given)[0] for kind, area in areas if area[sampled].any()}
 
     @_in_summer
     def sampled_bound(self) -> Floats:

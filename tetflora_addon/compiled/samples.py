@@ -12,6 +12,7 @@ Those of trunks know which limbs they are on, so that they can be moved as the c
 
 from collections.abc import Container, Sequence
 from dataclasses import dataclass, replace
+from itertools import product
 from typing import Self
 
 import numpy as np
@@ -74,9 +75,9 @@ class Samples:
 
 
 def draw_samples(
-    rows: Table, leaf_area: Floats, wood_area: Floats, length: Floats, sampled: Container[int], times: int
-) -> Samples:
-    """Sample rows.
+    rows: Table, leaf_area: Floats, wood_area: Floats, length: Floats, sampled: Container[int], *times: int
+) -> list[Samples]:
+    """Sample rows, once for each of several numbers.
 
     Parameters
     ----------
@@ -87,18 +88,19 @@ def draw_samples(
         Typical length of a branch, meters.
     sampled : container of int
         Which rows.
-    times : int
+    times : ints
         So many times as many as proxies need.
     """
-    leaves, wood = [], []
+    drawn = {number: ([], []) for number in times}
     trunk = np.flatnonzero(np.diff(rows["species"], prepend=-1))
     for first, end in zip(trunk, [*trunk[1:], len(rows)], strict=True):
-        walk = _Walk(rows, int(first), int(end), leaf_area, length, times)
-        for row in filter(sampled.__contains__, range(first, end)):
+        walk = _Walk(rows, int(first), int(end), leaf_area, length)
+        for row, number in product(filter(sampled.__contains__, range(first, end)), times):
+            leaves, wood = drawn[number]
             for points, area, out in ((walk.leaves, leaf_area, leaves), (walk.wood, wood_area, wood)):
                 if area[row].sum() > 0:
-                    out.append((row, *walk.sampled(points, row, area[row])))
-    return Samples(_joined(leaves, len(rows)), _joined(wood, len(rows)))
+                    out.append((row, *walk.sampled(points, row, area[row], number)))
+    return [Samples(_joined(leaves, len(rows)), _joined(wood, len(rows))) for leaves, wood in drawn.values()]
 
 
 def _turned(cos: Floats, azimuth: Floats) -> Floats:
@@ -161,8 +163,8 @@ class _Walk:
     those of each row that paths have followed, ``leaves`` and ``wood`` what they have met.
     """
 
-    def __init__(self, rows: Table, first: int, end: int, leaf_area: Floats, length: Floats, times: int) -> None:
-        self.rows, self.first, self.times = rows, first, times
+    def __init__(self, rows: Table, first: int, end: int, leaf_area: Floats, length: Floats) -> None:
+        self.rows, self.first = rows, first
         self.length = np.where(length[first:end] > 0, length[first:end], 1.0) / max(length[first], 1e-9)
         self.scale = 1 / max(length[first], 1e-9)
         drawn = rows["drawn"][first:end]
@@ -234,7 +236,9 @@ class _Walk:
         branches = Branches.apart(row, key, frame, self.length[row - self.first], self.scale)
         return _Arrived(branches, np.ones(n), np.full((self.slot[-1] + 1, n), -1, np.int32))
 
-    def sampled(self, points: _Points | None, row: int, expected: Floats) -> tuple[_Points, Integers, Integers]:
+    def sampled(
+        self, points: _Points | None, row: int, expected: Floats, times: int
+    ) -> tuple[_Points, Integers, Integers]:
         """Samples of what grows on branches of a row, and first sample and number of samples for each class (c,), (c,).
 
         They are drawn by area from points on leaves or wood, in the axes of the branches. ``expected`` (r,) is the
@@ -252,11 +256,11 @@ class _Walk:
         area = points.area[borne] * (expected / np.where(met > 0, met, 1))[points.row[borne]]
         base, under = self.branches[i], points.line[borne, self.slot[i]] - self.start[i]
         place = _in_bands(points, borne, base, under)
-        group, numbers = np.zeros(len(borne), np.int64), np.full(_CLASSES, int(self.times * SAMPLES * self.fraction[i]))
+        group, numbers = np.zeros(len(borne), np.int64), np.full(_CLASSES, int(times * SAMPLES * self.fraction[i]))
         first = np.zeros(_CLASSES, np.int64)
         if self.rows["tropic"][row]:
             group = _GROUPS[_stand_classes(base.frame[:, 2, :])][under]
-            numbers = (self.times * np.where(_UPRIGHT, _OF_UPRIGHT, _OF_CLASS) * self.fraction[i]).astype(np.int64)
+            numbers = (times * np.where(_UPRIGHT, _OF_UPRIGHT, _OF_CLASS) * self.fraction[i]).astype(np.int64)
             distinct = np.where(np.arange(_CLASSES) == _GROUPS, numbers, 0)
             first = (np.cumsum(distinct) - distinct)[_GROUPS]
             pick = systematic(area, group, place, distinct)

@@ -131,7 +131,8 @@ def _crown_of(species: Species) -> Crown:
     flora = compile_species([species])
     trunk = trunks(flora.rows, Seeds.upright(_PLANTS))
     row, length = int(trunk.row[0]), float(trunk.length.mean())
-    points = flora.samples.leaves if flora.leaf_count[row] > 0 else flora.samples.wood
+    coarse, fine = flora.samples_of((row,), 1, _FINER)
+    points = coarse.leaves if flora.leaf_count[row] > 0 else coarse.wood
     first, samples = int(points.first[row, -1]), int(points.number[row, -1])
     place = length * points.position[first : first + samples].astype(np.float64)
     reach = _LEAF_LEANS * float(flora.leaf_reach[row])
@@ -144,8 +145,7 @@ def _crown_of(species: Species) -> Crown:
     color = tuple((areas @ colors / areas.sum()).tolist())
     polygons = expected_polygons(flora.species[0])
     forms = tuple(next(iter(group), None) for group in flora.forms[0])
-    samples = flora.samples_of((row,), _FINER)
-    group = _leaf_parts(flora, samples.leaves, row, trunk.length), _branch_parts(flora, samples.wood, row, trunk.length)
+    group = _leaf_parts(flora, fine.leaves, row, trunk.length), _branch_parts(flora, fine.wood, row, trunk.length)
     parts = CrownParts.concatenate(group)
     return Crown(radius, height, polygons, base, float(leaves.mean()), float(wood.mean()), color, forms, parts)
 
@@ -488,8 +488,7 @@ def _mean_tips(rows: Table, stems: Branches, lines: Axes) -> tuple[Integers, Int
         across, aside, upright = stems.frame[:, k].T
         tips[:, k] = stems.position[owner, k] + t * rise[owner, k]
         tips[:, k] += c * across[owner] + s * aside[owner] + cosine * upright[owner]
-    tips = _in_ways(tips).astype(np.float32)
-    return counts, owner, index, tips
+    return counts, owner, index, _in_ways(tips).astype(np.float32)
 
 
 def beyond_limbs(rows: Table, first: int, species: int) -> TwigReach:
@@ -530,8 +529,7 @@ def _fitted(rows: Table, limbs: Branches, up: bool) -> tuple[float, float]:
     over = _all_extremes(rows, limbs, way[:, None])[:, 0] - reach
     terms = np.stack([np.ones(len(limbs)), limbs.length], axis=1)
     (meters, part), *_ = np.linalg.lstsq(terms, over, rcond=None)
-    luck = _LUCK * (over - terms @ [meters, part]).std() / limbs.length.mean()
-    return float(meters), float(part + luck)
+    return float(meters), float(part + _LUCK * (over - terms @ [meters, part]).std() / limbs.length.mean())
 
 
 def _leaf_tips(rows: Table, branches: Branches, lines: Axes) -> tuple[Integers, Floats]:

@@ -35,8 +35,7 @@ def leaf_roughness(gloss: float) -> float:
     """Roughness at which a surface by Fresnel mirrors as much as leaves do, both facing it and on the whole."""
     amplitude = np.sqrt(FACING * gloss)
     index = (1.0 + amplitude) / (1.0 - amplitude)
-    mirrored = [np.interp(index, _INDEX, row) for row in _MIRRORED[::-1]]
-    return float(np.interp(gloss, mirrored, _ROUGHNESS[::-1]))
+    return float(np.interp(gloss, [np.interp(index, _INDEX, row) for row in _MIRRORED[::-1]], _ROUGHNESS[::-1]))
 
 
 #: Attributes of points by name, each with its type and values.

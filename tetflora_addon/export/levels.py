@@ -292,7 +292,7 @@ class Grid:
         for mesh in meshes:
             owner, corners = triangles(mesh)
             seen = in_axes(mesh.positions, _axes(self.toward))
-            self._draw([seen[:, k][corners.T] for k in range(3)], owner + first, depth, face)
+            self._draw([seen[:, k].take(corners.T) for k in range(3)], owner + first, depth, face)
             first += mesh.polygons
         return depth, face
 
@@ -324,13 +324,14 @@ class Grid:
             batch = drawn[run]
             of, index = spread((wide[batch] * tall[batch]).astype(np.int64))
             of = batch[of]
-            column, row = left[of] + index % wide[of], below[of] + index // wide[of]
-            ax, ay = x[:, of] - column.astype(np.float32), y[:, of] - row.astype(np.float32)
+            row, column = np.divmod(index.astype(np.int32), wide[of])
+            row, column = below[of] + row, left[of] + column
+            ax, ay = x.take(of, axis=1) - column.astype(np.float32), y.take(of, axis=1) - row.astype(np.float32)
             weights = [ax[i] * ay[j] - ay[i] * ax[j] for i, j in ((1, 2), (2, 0), (0, 1))]
             inside = np.flatnonzero((_least(weights) >= 0.0) | (-_least([-w for w in weights]) <= 0.0))
             of, weights = of[inside], [w[inside] for w in weights]
             total = weights[0] + weights[1] + weights[2]
-            near = sum(w * z[k, of] for k, w in enumerate(weights)) / np.where(total == 0.0, 1.0, total)
+            near = sum(w * z[k].take(of) for k, w in enumerate(weights)) / np.where(total == 0.0, 1.0, total)
             cell = row[inside] * columns + column[inside]
             nearer = np.flatnonzero(near > depth[cell])
             near, cell, of = near[nearer], cell[nearer], of[nearer]

@@ -83,6 +83,7 @@ def _sides(meshes: Sequence[MeshBuffers]) -> Floats:
     ]
     shadows = [lamp.nearest(meshes)[0] for lamp, *_ in lamps]
     lit, every = np.zeros((3, len(meshes))), np.zeros(len(meshes))
+    flat = lit.reshape(-1)  # in which numpy adds up in a fifth of the time
     for grid in (Grid.around(toward, cell, points, cell) for toward in _VIEWS):
         depth, face = grid.nearest(meshes)
         face, place = face[depth > -np.inf], grid.places(depth)
@@ -91,7 +92,7 @@ def _sides(meshes: Sequence[MeshBuffers]) -> Floats:
             falls = normal[face] @ lamp.toward
             light = bright * np.abs(falls)
             seen = light * np.where(lamp.reaches(place, shadow, _SLACK * cell), 1.0, passing)
-            np.add.at(lit, (np.where(front == (falls > 0.0), np.where(front, 0, 1), 2), part[face]), seen)
+            np.add.at(flat, np.where(front == (falls > 0.0), np.where(front, 0, 1), 2) * len(meshes) + part[face], seen)
             np.add.at(every, part[face], light)
     shaded = 1.0 - lit.sum(axis=0) / np.maximum(every, 1e-30)
     return np.column_stack([*(lit / np.maximum(lit[:2].sum(axis=0), 1e-30)), shaded])

@@ -199,8 +199,7 @@ def read_ascii(path: Path) -> Job[Raster]:
     if done < len(values):
         raise SceneError(f"{name}: line {line}: it ends after {done:,} of {len(values):,} values; get it again")
     values = without_nodata(values.reshape(height, width), header.get("nodata_value", -9999.0))
-    first = np.array([corner[0], corner[1] + (height - 1) * dy])
-    return Raster(values, first, *upright(dx, dy), system_beside(path))
+    return Raster(values, np.array([corner[0], corner[1] + (height - 1) * dy]), *upright(dx, dy), system_beside(path))
 
 
 def _ascii_head(header: dict[str, float], name: str) -> tuple[int, int, tuple[float, float], float, float]:

@@ -41,13 +41,15 @@ class Draw(IntEnum):
 def mix(z: Keys) -> Keys:
     """64-bit integers (...) scrambled (the finaliser of SplitMix64; Steele, Lea and Flood, OOPSLA 2014)."""
     z = np.asarray(z, dtype=np.uint64)
-    with np.errstate(over="ignore"):  # only scalars warn; wrapping is what is wanted
-        z = z ^ (z >> np.uint64(30))  # a new array, in which all that follows is worked out
-        z *= _MIX_1
-        z ^= z >> np.uint64(27)
-        z *= _MIX_2
-        z ^= z >> np.uint64(31)
-        return z
+    if z.ndim == 0:  # only scalars warn; wrapping is what is wanted
+        return mix(z[None])[0]
+    shifted = z >> np.uint64(30)
+    z = z ^ shifted  # a new array, in which all that follows is worked out
+    z *= _MIX_1
+    z ^= np.right_shift(z, np.uint64(27), out=shifted)
+    z *= _MIX_2
+    z ^= np.right_shift(z, np.uint64(31), out=shifted)
+    return z
 
 
 def place_keys(place: Floats) -> Keys:
@@ -93,8 +95,7 @@ def stepped(key: Keys, index: Integers) -> Floats:
     Steps by the golden section (H. Weyl, "Über die Gleichverteilung von Zahlen mod. Eins", 1916): of any run of them,
     the fraction inside an interval is its length, to within one or two.
     """
-    turned = key + np.asarray(index).astype(np.uint64) * _GOLDEN
-    return (turned >> np.uint64(11)).astype(np.float64) * _TO_UNIT
+    return ((key + np.asarray(index).astype(np.uint64) * _GOLDEN) >> np.uint64(11)).astype(np.float64) * _TO_UNIT
 
 
 def signed(key: Keys, draw: int) -> Floats:

@@ -142,8 +142,7 @@ def spread_children(
     place, weight, extra = some_nodes(law, np.array([foot, max(nodes[FRESH], foot), until]) * nodes[NOW], nodes[EXTRA])
     t = np.clip(place / nodes[NOW], 0, 1)
     low, high = row["fraction"][sort] if among is None else among
-    fraction = low + (high - low) * (t - foot) / max(until - foot, 1e-9)
-    return t, fraction, weight, faded(t, *nodes[FADES:], extra)
+    return t, low + (high - low) * (t - foot) / max(until - foot, 1e-9), weight, faded(t, *nodes[FADES:], extra)
 
 
 def lengths(rows: Table, row: Integers, fraction: Floats) -> Floats:
@@ -212,8 +211,7 @@ class Grown:
         number = number / np.maximum(dense, 1e-9)
         t = np.clip(NodeLaw(*(one[owner] for one in self.law)).place_of(number) / self.now[owner], 0, 1)
         begin, end = self.ends[:, owner]
-        part = np.clip((t - begin) / np.maximum(end - begin, 1e-9), 0, 1)
-        return t, part, faded(t, *self.fades[:, owner], extra)
+        return t, np.clip((t - begin) / np.maximum(end - begin, 1e-9), 0, 1), faded(t, *self.fades[:, owner], extra)
 
 
 MAX_SEGMENTS = 24

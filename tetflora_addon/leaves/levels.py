@@ -477,5 +477,4 @@ def _texture(model: LeafModel, positions: Floats) -> Floats32:
     """Texture coordinates (k, 4, 2): those of the model, as far as a linear function follows them."""
     corners = model.positions[model.corner_verts]
     fitted = np.linalg.lstsq(np.column_stack([corners, np.ones(len(corners))]), model.uv, rcond=None)[0]
-    uv = positions @ fitted[:3] + fitted[3]
-    return np.clip(uv, model.uv.min(axis=0), model.uv.max(axis=0)).astype(np.float32)
+    return np.clip(positions @ fitted[:3] + fitted[3], model.uv.min(axis=0), model.uv.max(axis=0)).astype(np.float32)

@@ -151,8 +151,7 @@ class LeafModel:
 
         Tufts and shoots of needles reach farther than what they show, and count as wide as an ovate leaf of that area.
         """
-        across = float(np.ptp(self.positions[:, [0, 2]], axis=0).max())
-        return min(across, _OVATE * float(np.sqrt(self.shown_area)))
+        return min(float(np.ptp(self.positions[:, [0, 2]], axis=0).max()), _OVATE * float(np.sqrt(self.shown_area)))
 
 
 def fans(model: LeafModel) -> tuple[Integers, Floats]:
@@ -169,6 +168,8 @@ def mean_silhouette(model: LeafModel) -> float:
     courbes et à la quadrature des surfaces", 1841). Directions follow a spiral over half of a sphere; faces are fans.
     """
     corners = fans(model)[1]
+    # The first and the last of each fan have no area.
+    corners = np.delete(corners, np.concatenate([model.face_offsets[:-1], model.face_offsets[1:] - 1]), axis=1)
     number = np.arange(_DIRECTIONS)
     total = 0.0
     for toward in spiral((number + 0.5) / _DIRECTIONS, number):
@@ -180,10 +181,11 @@ def mean_silhouette(model: LeafModel) -> float:
         least = np.ceil(flat.min(axis=0)).astype(np.int64).clip(0, _CELLS)
         wide = np.maximum(np.floor(flat.max(axis=0)).astype(np.int64).clip(-1, _CELLS - 1) - least + 1, 0)
         owner, index = spread(wide.prod(axis=1))
-        x, y = (least[owner, i] + step for i, step in enumerate(np.divmod(index, np.maximum(wide[owner, 1], 1))))
-        a, b, c = ((corner[owner, 0] - x, corner[owner, 1] - y) for corner in flat)
+        x, y = np.divmod(index, np.maximum(wide[:, 1], 1)[owner])
+        x, y = least[:, 0][owner] + x, least[:, 1][owner] + y
+        a, b, c = ((u[owner] - x, v[owner] - y) for u, v in np.ascontiguousarray(flat.transpose(0, 2, 1)))
         one, two, three = (u[0] * v[1] - u[1] * v[0] for u, v in ((a, b), (b, c), (c, a)))
-        inside = ((one >= 0.0) & (two >= 0.0) & (three >= 0.0)) | ((one <= 0.0) & (two <= 0.0) & (three <= 0.0))
+        inside = (np.minimum(np.minimum(one, two), three) >= 0.0) | (np.maximum(np.maximum(one, two), three) <= 0.0)
         covered = np.zeros((_CELLS, _CELLS), np.bool_)
         covered[x[inside], y[inside]] = True
         total += np.count_nonzero(covered) / _CELLS**2 * np.prod(high - low)

@@ -84,8 +84,7 @@ class LeafSurface:
 
     def moved(self, matrix: Floats, place: Floats) -> Self:
         """The surface with its points times a matrix (3, 3) or (k, 3, 3), whose columns are its axes, at a place."""
-        points = self.positions @ np.swapaxes(matrix, -1, -2) + np.reshape(place, (-1, 1, 3))
-        return replace(self, positions=points)
+        return replace(self, positions=self.positions @ np.swapaxes(matrix, -1, -2) + np.reshape(place, (-1, 1, 3)))
 
 
 def _along(*factors: float | Floats) -> Floats:
@@ -193,8 +192,7 @@ def needle_surface(needles: Needles, tolerance: float, factor: float = 1.0) -> L
         frame = np.stack([across, along, np.cross(across, along)], axis=1)
         parts.append(_shoot(needles, i, tolerance, factor).moved(frame, np.zeros(3)))
     error = needles.gap * (_SPARSE_GAP if tolerance > SPARSE else 1.0)
-    error = error if tolerance > FLAT else min(tolerance, error)
-    return replace(joined(parts), error=error)
+    return replace(joined(parts), error=error if tolerance > FLAT else min(tolerance, error))
 
 
 def _shoot(needles: Needles, number: int, tolerance: float, factor: float) -> LeafSurface:
@@ -311,8 +309,7 @@ def crossings(points: Floats) -> int:
         return link[:, None, 0] * away[..., 1] - link[:, None, 1] * away[..., 0]
 
     first, last = side(a), side(b)
-    across = (first * last < -1e-18) & (first.T * last.T < -1e-18)
-    return int(across.sum() // 2)
+    return int(((first * last < -1e-18) & (first.T * last.T < -1e-18)).sum() // 2)
 
 
 def blade_surface(blade: Blade, tolerance: float, amount: float = 1.0) -> LeafSurface:

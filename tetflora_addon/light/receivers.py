@@ -163,8 +163,7 @@ class SurfaceElements:
             return limits[0]
         vector = np.cross(self.corners[:, 2] - self.corners[:, 0], self.corners[:, 3] - self.corners[:, 1])
         side = np.sqrt(np.median(np.linalg.norm(vector, axis=1)) / 2.0)
-        reach = np.ptp(self.corners.reshape(-1, 3), axis=0).max()
-        return int(np.clip(reach / max(_ROOMY * side, 1e-9), *limits))
+        return int(np.clip(np.ptp(self.corners.reshape(-1, 3), axis=0).max() / max(_ROOMY * side, 1e-9), *limits))
 
     def thinned(self, most: int) -> tuple[Self, Integers]:
         """At most so many sheets, larger as they are fewer, and the number (m,) of each of these among them, or −1."""
@@ -221,8 +220,7 @@ class KeyMeans:
         sums = np.stack([np.bincount(self._key, column, 4 * self._count) for column in flat.T], axis=1)
         sums, number = sums.reshape(self._count, 4, -1), self._number[..., None]
         every = sums.sum(axis=1, keepdims=True) / np.maximum(number.sum(axis=1, keepdims=True), 1)
-        result = np.where(number > 0, sums / np.maximum(number, 1), every)
-        return result.reshape(4 * self._count, *values.shape[1:])
+        return np.where(number > 0, sums / np.maximum(number, 1), every).reshape(4 * self._count, *values.shape[1:])
 
     def by_cell(self, values: Floats) -> Floats:
         """Means (n, ...) over the samples of each tetrahedron, from those (4 n, ...) of its key points."""

@@ -117,8 +117,7 @@ def _planes(corners: Floats) -> tuple[Floats, Mask]:
     upright = np.abs(area) > 1e-12 * np.maximum(size * size, 1e-12)
     area = np.where(upright, area, 1.0)
     east = (u[:, 2] * v[:, 1] - v[:, 2] * u[:, 1]) / area
-    north = (v[:, 2] * u[:, 0] - u[:, 2] * v[:, 0]) / area
-    return np.stack([east, north], axis=1), upright
+    return np.stack([east, (v[:, 2] * u[:, 0] - u[:, 2] * v[:, 0]) / area], axis=1), upright
 
 
 def _draw(corners: Floats, slope: Floats, triangle: Integers, row: Integers, columns: int, top: Floats) -> None:

@@ -294,8 +294,7 @@ def _faces() -> Integers:
 
 def _repeated(indices: Integers, corners: int, times: int) -> Integers32:
     """The same faces or edges for each of many plants of so many corners."""
-    every = indices[None] + corners * np.arange(times)[:, None, None]
-    return every.reshape(-1, indices.shape[1]).astype(np.int32)
+    return (indices[None] + corners * np.arange(times)[:, None, None]).reshape(-1, indices.shape[1]).astype(np.int32)
 
 
 def simple_crowns(

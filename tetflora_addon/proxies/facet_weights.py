@@ -388,7 +388,7 @@ def least_weights(view: View, facets: Facets) -> Floats:
     facet, step = spread(np.maximum(high - low + 1, 0))
     # On each line of the lattice, rays from where the last of the sides is entered to where the first is left.
     column = low[facet] + step
-    intercept, slope = by_x[:, facet] * (column - center[0][facet]), by_y[:, facet]
+    intercept, slope = by_x.take(facet, axis=1) * (column - center[0][facet]), by_y.take(facet, axis=1)
     with np.errstate(divide="ignore", invalid="ignore"):
         ends = (largest - intercept) / slope
     enter = np.where(slope < 0, ends, -np.inf).max(axis=0) + center[1][facet]
@@ -398,7 +398,8 @@ def least_weights(view: View, facets: Facets) -> Floats:
     line, step = spread(np.maximum(last - first + 1, 0))
     row = first[line] + step
     # How many times as large the triangle has to be to reach the ray.
-    scale = (intercept[:, line] + slope[:, line] * (row - center[1][facet[line]])).max(axis=0)
+    up = row - center[1][facet[line]]
+    scale = np.maximum.reduce([i.take(line) + s.take(line) * up for i, s in zip(intercept, slope, strict=True)])
     inside = np.flatnonzero(scale <= largest)  # a side along the line has neither been entered nor left
     ray, scale = _ray_numbers(column[line[inside]], row[inside]), scale[inside]
     order = np.argsort(ray, kind="stable")

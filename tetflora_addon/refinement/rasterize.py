@@ -224,8 +224,7 @@ def _with_small_ones(
     thickness = np.concatenate([pieces.thickness, chord[missed]])
     by_area = by_area[cell]
     thickness = np.where(by_area, chord[cell], thickness)
-    coverage = np.where(by_area, area[cell] / np.maximum(count[cell], 1), 1.0)
-    return Fragments(cell, pixel, entry, thickness, coverage)
+    return Fragments(cell, pixel, entry, thickness, np.where(by_area, area[cell] / np.maximum(count[cell], 1), 1.0))
 
 
 def _draw_triangles(triangles: Floats, camera: Camera, width: int, height: int, nearest: Floats) -> None:

@@ -20,6 +20,7 @@ from typing import Any
 
 import numpy as np
 
+from ..parameters import altered
 from .catalog import LENGTH_HIGH, ORDER_KEYS
 from .members import bisected, expected_leaf_area
 from .skeletons import Skeleton
@@ -220,7 +221,7 @@ class _Aged:
         diameter = ages.diameters(years)
         powers = [_STOOL if o < self.stem else 1.0 for o in range(self.stem + 1)]
         self.stout = [diameter**power for power in powers] + [now**_STOUT for now in self.now[self.stem + 1 :]]
-        self.youth = float(np.clip((1 - self.now[self.stem]) / 0.5, 0, 1))
+        self.youth = min(max((1 - self.now[self.stem]) / 0.5, 0.0), 1.0)
         self.declined = ages.declined(years)
         self.dead = max(years - ages.lifespan, 1e-6) if years >= ages.lifespan else 0.0
         self.crowded, self.extra, self.fresh, self.thin = crowded, 0.0, fresh, thin
@@ -228,7 +229,7 @@ class _Aged:
     def _lengths(self, years: float) -> list[float]:
         """Lengths by order over those when full-grown."""
         height, limbs = self.ages.heights(years), self.ages.diameters(years) ** self.ages.spread
-        limbs = float(np.clip(limbs, 0.45 * height, 1.4 * height**0.8))
+        limbs = min(max(limbs, 0.45 * height), 1.4 * height**0.8)
         out = [height**0.5] * self.stem + [height]
         for o in range(self.stem + 1, self.last + 1):
             steps = self.last - self.stem - 1
@@ -273,12 +274,12 @@ class _Aged:
         spur, dead = one.spur, one.dead
         if spur is not None:
             size = min(1.0, _LEAF * self.height / max(spur.length.high, 1e-9))
-            spur = self._barked(replace(spur, length=spur.length.scaled(size), leaf_size=self._leaf(spur)))
+            spur = self._barked(altered(spur, length=spur.length.scaled(size), leaf_size=self._leaf(spur)))
         if dead is not None:
             number, on_limbs = (self._dead_nodes(o)[0] for o in range(2))
-            dead = replace(self._dead(), number=dead.number.scaled(number), on_limbs=dead.on_limbs.scaled(on_limbs))
+            dead = altered(self._dead(), number=dead.number.scaled(number), on_limbs=dead.on_limbs.scaled(on_limbs))
         bud, bark = (None if self.dead else one.bud), _STRIPS if self.dead > _GRAYING else one.bark
-        return replace(one, orders=orders, spur=spur, dead=dead, bud=bud, bark=bark)
+        return altered(one, orders=orders, spur=spur, dead=dead, bud=bud, bark=bark)
 
     @property
     def height(self) -> float:
@@ -290,15 +291,15 @@ class _Aged:
     def leafless(self) -> float:
         """Factor on the number of leaves."""
         ages = self.ages
-        dying = np.clip((ages.lifespan - self.years) / (0.03 * ages.lifespan), 0, 1)
-        return float((1 - 0.4 * self.declined) * dying) * self.thin
+        dying = min(max((ages.lifespan - self.years) / (0.03 * ages.lifespan), 0.0), 1.0)
+        return (1 - 0.4 * self.declined) * dying * self.thin
 
     def _order(self, o: int) -> Order:
         order, now = self.one.orders[o], self.now[o]
         stool, size = o < self.stem, 1.0 if o < self.stem else now
         numbers, nodes = zip(*self._sorts(o), strict=True)
         ramp = min(_RAMP / max(order.branches.mean * numbers[0], 1e-9), 0.35) * min(abs(size - 1) / _NEAR, 1)
-        settled = 1.0 if o <= self.stem else float(np.clip(1 - abs(now - 1) / _NEAR, 0, 1))
+        settled = 1.0 if o <= self.stem else min(max(1 - abs(now - 1) / _NEAR, 0.0), 1.0)
         changes: dict[str, Any] = {
             "length": order.length.scaled(now if o == 0 else now / self.now[o - 1]),
             "thickness": self._thickness(o),
@@ -327,7 +328,7 @@ class _Aged:
             changes["angle"] = Range(mean, order.angle.variation)
             if order.attraction.mean < 0:
                 changes["attraction"] = order.attraction.scaled(0.2 + 0.8 * old)
-        return self._barked(replace(order, **changes))
+        return self._barked(altered(order, **changes))
 
     def _bare(self, o: int, start: float) -> float:
         """Where the crown of an axis begins, in lengths of the full-grown one."""
@@ -348,7 +349,7 @@ class _Aged:
         # Branches grow from the shoots of the years before.
         until = 1 - self._leader(o) * self.youth if o >= self.stem else 0.3 + 0.7 * min(now, 1.0)
         more = _MORE if o == self.stem and order.forks.high > 0 else 1.0
-        flowers = float(np.clip((self.years / max(self.ages.flowers, 1e-9) - 0.7) / 0.6, 0, 1))
+        flowers = min(max((self.years / max(self.ages.flowers, 1e-9) - 0.7) / 0.6, 0.0), 1.0)
         if self.one.spur is not None and self.one.spur.leaf_kind == "leaf":
             flowers = 1.0
         tier = o - self.stem
@@ -372,7 +373,7 @@ class _Aged:
         start, now = min(start, 0.99), 1.0 if o < self.stem else self.now[o]
         power = 1.0 if start > _ROSETTE else _POWERS[0] + (_POWERS[1] - _POWERS[0]) * self.crowded
         law = NodeLaw(start, 1.0, power, 1.0, more * start / ((1 - start) * power))
-        first, top = (float(law.number_at(place)) for place in (self._bare(o, start), until * now))
+        first, top = (law.number_at(place) for place in (self._bare(o, start), until * now))
         extra, fresh = (0.0, 0.0) if extra is None else (extra, self.fresh)
         number = kept * (top - first) * (1 + extra * fresh)
         if number <= 0:
@@ -433,7 +434,7 @@ class _Aged:
         gray = min(self.dead / _GRAYING, 1.0)
         mean, variation = order.branch_color
         mixed = tuple((1 - gray) * c + gray * g for c, g in zip(mean, _GRAY, strict=True))
-        return replace(order, branch_color=Color(mixed, variation), leaves=Range(0.0))
+        return altered(order, branch_color=Color(mixed, variation), leaves=Range(0.0))
 
     def _dead_nodes(self, o: int) -> tuple[float, Nodes]:
         dead = self.one.dead
@@ -449,4 +450,4 @@ class _Aged:
     def _dead(self) -> Dead:
         """Dead branches, which reach farther up, and farther out on limbs, as the plant declines."""
         dead = self.one.dead
-        return replace(dead, high=dead.high + self.declined * max(0.9 - dead.high, 0.0))
+        return altered(dead, high=dead.high + self.declined * max(0.9 - dead.high, 0.0))

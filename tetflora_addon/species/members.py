@@ -15,6 +15,11 @@ from ..arrays import Floats
 from ..leaves.models import LeafModel
 from .species import EVEN, Dead, Order, Range, Species, crown_ratio, faded, fork_cuts, shortened, some_nodes, whole_cuts
 
+#: By crown, the least length ratio, and those of laterals that stand evenly along a branch.
+_least = lru_cache(lambda crown: float(crown_ratio(crown, np.linspace(0, 1, 65)).min()))
+_evenly = lru_cache(lambda crown: crown_ratio(crown, 1 - EVEN))
+_ONE, _DEAD_EVENLY = np.ones(1), crown_ratio("tapered", EVEN)
+
 
 @dataclass(frozen=True)
 class Members:
@@ -35,7 +40,7 @@ def expected_members(species: Species) -> Members:
     number = full = 1.0  # branches of the order, and the sum of the factors on what they bear
     for i, order in enumerate(species.orders):
         cuts = fork_cuts(order)
-        fold = expected_forks(order.forks) ** np.arange(len(cuts) - 1)  # stems side by side in each part
+        fold = _ONE if len(cuts) == 2 else expected_forks(order.forks) ** np.arange(len(cuts) - 1)  # stems side by side
         branches.append(number)
         segments.append(number * float(fold @ part_segments(order)))
         leaves.append(full * order.leaves.mean * _fold(cuts, fold, order.leaf_start))
@@ -44,11 +49,11 @@ def expected_members(species: Species) -> Members:
             dead += full * _dead_on(species.dead, order, i, cuts, fold)
         if i + 1 < len(species.orders):
             place, vigor, weight = _laterals(order)
-            stems_there = weight * fold[np.searchsorted(cuts[1:-1], place, side="right")]
+            stems_there = weight * _stems(cuts, fold, place)
             follow = 1 - species.orders[i + 1].count_by_length * (1 - vigor)
             if order.growing is not None:
-                follow = follow * np.clip(vigor / least_length(order), 0, 1)
-            number = full * order.branches.mean * float(stems_there.mean())
+                follow = follow * np.minimum(vigor / least_length(order), 1)
+            number = full * order.branches.mean * float(np.mean(stems_there))
             full = full * order.branches.mean * float((stems_there * follow).mean())
     on_spur = species.spur.leaves.mean if species.spur is not None else 0.0
     return Members(branches, segments, leaves, spurs, spurs * on_spur, tuple(dead))
@@ -71,25 +76,21 @@ def expected_leaf_area(species: Species) -> float:
 
 def _laterals(order: Order) -> tuple[Floats, Floats, Floats | float]:
     """Places (n,) of laterals on a branch of an order, length ratios (n,), and how many each stands for (n,)."""
-    start, fraction, short, weight = order.branch_start.mean, EVEN, 1.0, 1.0
-    place = start + (1 - start) * fraction
-    part = order.growing
-    if part is not None and order.branches.mean > 0:
-        nodes = part.laterals
-        law = nodes.law(order.branches.mean)
-        _, fresh, end = ends = nodes.ends(law, start, part.now)
-        place, weight, extra = some_nodes(law, ends, nodes.extra)
-        short, place = faded(place, fresh, end - fresh, extra), np.clip(place / part.now, 0, 1)
-        fraction = (place - start) / max(nodes.until - start, 1e-9)
-        short = short * shortened(fraction, *part.ramps)
-    return place, short * crown_ratio(order.crown, 1 - fraction), weight
+    start, part = order.branch_start.mean, order.growing
+    if part is None or order.branches.mean <= 0:
+        return start + (1 - start) * EVEN, _evenly(order.crown), 1.0
+    nodes = part.laterals
+    law = nodes.law(order.branches.mean)
+    _, fresh, end = ends = nodes.ends(law, start, part.now)
+    place, weight, extra = some_nodes(law, ends, nodes.extra)
+    short, place = faded(place, fresh, end - fresh, extra), np.clip(place / part.now, 0, 1)
+    fraction = (place - start) / max(nodes.until - start, 1e-9)
+    return place, short * shortened(fraction, *part.ramps) * crown_ratio(order.crown, 1 - fraction), weight
 
 
 def least_length(order: Order) -> float:
     """Shortest length ratio of laterals of an order that is still growing, but for new ones; 0 if it is full-grown."""
-    if order.growing is None:
-        return 0.0
-    return float(crown_ratio(order.crown, np.linspace(0, 1, 65)).min())
+    return 0.0 if order.growing is None else _least(order.crown)
 
 
 @lru_cache(maxsize=256)
@@ -103,12 +104,23 @@ def expected_forks(forks: Range, power: float = 1.0) -> float:
 
 def part_segments(order: Order) -> np.ndarray:
     """Straight pieces of each part of a branch between its forks."""
+    if order.forks.high <= 0:
+        return np.array([max(float(round(order.segments)), 1.0)])
     return np.maximum(np.rint(order.segments * np.diff(whole_cuts(order))), 1)
+
+
+def _stems(cuts: list[float], fold: np.ndarray, place: Floats) -> Floats | float:
+    """Stems side by side at places (n,)."""
+    return fold[np.searchsorted(cuts[1:-1], place, side="right")] if len(cuts) > 2 else 1.0
 
 
 def _fold(cuts: list[float], fold: np.ndarray, start: Range) -> float:
     """How many times as many things a branch bears because it divides; they are spread evenly from ``start`` on."""
-    return float(fold @ np.diff(np.clip((np.array(cuts) - start.mean) / (1 - start.mean), 0, 1)))
+    return (
+        1.0
+        if len(cuts) == 2
+        else float(fold @ np.diff(np.clip((np.array(cuts) - start.mean) / (1 - start.mean), 0, 1)))
+    )
 
 
 def expected_polygons(species: Species) -> float:
@@ -134,9 +146,9 @@ def _dead_on(dead: Dead, order: Order, i: int, cuts: list[float], fold: np.ndarr
     """Expected dead branches (2,) by their order on one trunk, or on one limb."""
     low, high = dead.part(order.branch_start.mean)
     wanted = (dead.on_limbs if i else dead.number).mean
-    stems = fold[np.searchsorted(cuts[1:-1], low + (high - low) * EVEN, side="right")]
-    full = 1 - dead.orders[0].count_by_length * (1 - dead_vigor(EVEN))
-    return wanted * np.array([stems.mean(), dead.orders[0].branches.mean * (full * stems).mean()])
+    stems = _stems(cuts, fold, low + (high - low) * EVEN)
+    full = 1 - dead.orders[0].count_by_length * (1 - _DEAD_EVENLY)
+    return wanted * np.array([np.mean(stems), dead.orders[0].branches.mean * (full * stems).mean()])
 
 
 def dead_vigor(fraction: Floats) -> Floats:
@@ -147,4 +159,4 @@ def dead_vigor(fraction: Floats) -> Floats:
 def leaf_polygons(species: Species, order: Order) -> float:
     """Mean polygons of the leaves that branches of an order bear."""
     forms = species.forms(order.leaf_kind) or species.leaf
-    return float(np.mean([form.polygons if isinstance(form, LeafModel) else 1 for form in forms]))
+    return sum(form.polygons if isinstance(form, LeafModel) else 1 for form in forms) / len(forms)

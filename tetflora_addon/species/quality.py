@@ -17,6 +17,7 @@ import numpy as np
 
 from ..errors import SpeciesError
 from ..leaves.models import LeafModel
+from ..parameters import altered
 from .catalog import MAX_POLYGONS, ORDER_KEYS
 from .members import Members, bisected, expected_members, expected_polygons
 from .species import QUALITY_LIMITS, Order, Range, Species
@@ -82,7 +83,7 @@ def with_quality(species: Species, quality: float) -> Species:
     members = expected_members(species)  # in which sides and segments have no part
 
     def thinned(shapes: list[tuple[float, float]], detail: float) -> Species:
-        tiers = [replace(o, sides=k, segments=s) for o, (k, s) in zip(_tiers(species), shapes, strict=True)]
+        tiers = [altered(o, sides=k, segments=s) for o, (k, s) in zip(_tiers(species), shapes, strict=True)]
         return _thinned(_with_tiers(species, tiers), members, detail)
 
     # Sides and segments as real numbers make the count continuous; once they are whole, members make up for it.
@@ -100,7 +101,7 @@ def _tiers(species: Species) -> list[Order]:
 def _with_tiers(species: Species, tiers: list[Order]) -> Species:
     """The species with other orders and short shoot, given as `_tiers` gives them."""
     number = len(species.orders)
-    return replace(species, orders=tuple(tiers[:number]), spur=tiers[number] if len(tiers) > number else None)
+    return altered(species, orders=tuple(tiers[:number]), spur=tiers[number] if len(tiers) > number else None)
 
 
 def _numbers(members: Members, species: Species) -> tuple[list[float], list[float]]:
@@ -149,7 +150,7 @@ def _thinned(species: Species, members: Members, detail: float) -> Species:
         if i + 1 < len(branches):
             count = _allowed(order, "branches", _left(branches[i + 1], detail, _crowd(branches[i + 1])) / factor)
         fewer = _scaled(order, spurs=spurs / factor, leaves=foliage / factor)
-        tiers[i] = replace(fewer, branches=order.branches.scaled(count))
+        tiers[i] = altered(fewer, branches=order.branches.scaled(count))
         factor *= count
     if species.spur is not None:
         tiers[-1] = _scaled(species.spur, leaves=foliage / spurs)
@@ -164,7 +165,7 @@ def _allowed(order: Order, name: str, factor: float) -> float:
 def _scaled(order: Order, **factors: float) -> Order:
     """An order with some of its ranges times factors, as far as their keys allow."""
     scaled = {name: getattr(order, name).scaled(_allowed(order, name, factors[name])) for name in factors}
-    return replace(order, **scaled)
+    return altered(order, **scaled)
 
 
 def _kept(described: Species, changed: Species) -> Species:

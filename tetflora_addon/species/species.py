@@ -87,6 +87,10 @@ class NodeLaw(NamedTuple):
 
     def number_at(self, place: ArrayLike) -> Floats:
         """Number (...) of nodes up to places (...), fractions of the full-grown length."""
+        if isinstance(place, float) and isinstance(self.begin, float):  # as below, in a tenth of the time
+            if place >= self.begin:
+                return self.whole * (place - self.begin) / max(self.end - self.begin, 1e-9)
+            return self.below * (min(max(place / max(self.begin, 1e-9), 0.0), 1.0) ** self.power - 1)
         place, begin = np.asarray(place, np.float64), np.asarray(self.begin, np.float64)
         above = self.whole * (place - begin) / np.maximum(self.end - begin, 1e-9)
         part = np.clip(place / np.maximum(begin, 1e-9), 0, 1)
@@ -532,4 +536,5 @@ def crown_ratio(shape: Integers | str, r: Floats) -> Floats:
     r = np.clip(r, 0.0, 1.0)
     if isinstance(shape, str):
         return _RATIOS[shape](r)
-    return np.choose(shape, [ratio(r) for ratio in _RATIOS.values()])
+    used = np.bincount(np.ravel(shape), minlength=len(_RATIOS))
+    return np.choose(shape, [ratio(r) if number else r for ratio, number in zip(_RATIOS.values(), used, strict=True)])

@@ -276,8 +276,7 @@ def _increment(one: Plants, wood: NDArray, lit: NDArray, traits: StandTraits) ->
     most = np.take(traits.diameter_increment, one.species) * one.quality * one.strength
     most *= np.minimum((1.0 + _HALF_LIT) * lit / (lit + _HALF_LIT), 1.0)
     large = (one.basal / (_LARGEST * np.take(traits.diameter, one.species))) ** 2
-    wood = wood * np.maximum(1.0 - large**2, 0.0)
-    return np.minimum(wood / np.maximum(more, 1e-9), most)
+    return np.minimum(wood * np.maximum(1.0 - large**2, 0.0) / np.maximum(more, 1e-9), most)
 
 
 def dying(one: Plants, traits: StandTraits, year: int) -> Mask:
@@ -601,5 +600,4 @@ class GrowingStand:
             return first
         # A dead tree that falls in the last year is recorded twice: the same row.
         first = first.take(np.flatnonzero(np.append(True, (np.diff(first.plant) != 0) | (np.diff(first.year) != 0))))
-        new = np.append(True, np.diff(first.plant) != 0)
-        return replace(first, plant=(np.cumsum(new) - 1).astype(np.int32))
+        return replace(first, plant=(np.cumsum(np.append(True, np.diff(first.plant) != 0)) - 1).astype(np.int32))

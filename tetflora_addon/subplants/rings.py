@@ -598,8 +598,7 @@ def bud_rings(flora: Flora, whole: WholeBranches, fine: Fineness) -> tuple[Rings
     wood = replace(branches.take(owner), radius=np.maximum(thick, 1e-9), length=np.maximum(length, 1e-9), later=None)
     bud = np.repeat(np.arange(len(owner)), BUD_RINGS)
     goes_on = np.tile(np.arange(BUD_RINGS) < BUD_RINGS - 1, len(owner))
-    rings = Rings(wood, bud, np.tile(_ALONG, len(owner)), center, reach, goes_on, later, None, color[species])
-    return rings, owner
+    return Rings(wood, bud, np.tile(_ALONG, len(owner)), center, reach, goes_on, later, None, color[species]), owner
 
 
 #: What there is beside the tubes of near branches: how it is made, sides by those of a tube, and rings of each one.

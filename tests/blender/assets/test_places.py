@@ -156,7 +156,9 @@ def test_instances_of_no_size_are_dropped():
 def test_a_moved_place_that_is_no_number_names_the_scatterer():
     ground = scattered(tree())
     ground.location.x = np.nan
-    with pytest.raises(SceneError, match=r'"ground": 5 of 5 instances of "tree".*Refine Scatter'):
+    with pytest.raises(
+        SceneError, match=r'"ground": 5 of 5 instances of "tree".*Refine Scatter in Properties > Object$'
+    ):
         read()
 
 

@@ -232,6 +232,36 @@ def test_rays_find_the_nearest_ground_of_many():
     assert (bent.matrix_world.inverted() @ place).z == pytest.approx(3.0, abs=1e-4)
 
 
+def test_plants_of_a_field_that_is_hidden_are_left_alone_and_others_are_seen():
+    add_mesh("ground", size=40.0)
+    _brush(store='FIELD')
+    _stroke()
+    hidden = _field()
+    before = len(_places(hidden))
+    hidden.hide_set(True)
+    _stroke(places=[(0.0, 12.0, 0.0)])
+    (new,) = (o for o in bpy.data.objects if o.tetflora.is_field and o != hidden)
+    assert new.visible_get()
+    assert len(_places(new)) > 0
+    assert len(_places(hidden)) == before
+    _stroke(places=[(0.0, -12.0, 0.0)])
+    assert sum(o.tetflora.is_field for o in bpy.data.objects) == 2
+
+
+def test_a_species_that_is_no_more_is_not_painted_but_can_be_erased():
+    add_mesh("ground", size=40.0)
+    _brush()
+    _stroke()
+    before, settings = len(_plants()), _brush(source='MIX', strength=1.0)
+    bpy.context.scene.tetflora.populate.mix.add().species = "gone_tree"
+    with pytest.raises(RuntimeError, match='Unknown species "gone_tree"; choose one of'):
+        _stroke()
+    assert len(_plants()) == before
+    assert settings.strokes == 1
+    _stroke('ERASE')
+    assert _plants() == []
+
+
 def test_settings_that_cannot_work_are_told_and_change_nothing():
     add_mesh("ground", size=30.0)
     _brush(radius=1000.0, density=1000.0)

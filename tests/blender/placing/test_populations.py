@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from tests.blender.scenes import add_mesh, add_plant, datablocks, depsgraph, select
-from tetflora_addon.blender.placing import population_data, populations
+from tetflora_addon.blender.placing import plant_objects, population_data, populations
 from tetflora_addon.blender.scene import fields
 
 pytestmark = pytest.mark.usefixtures("clean_file")
@@ -171,6 +171,18 @@ def test_remove_may_keep_the_plants():
     _ops().remove_layer(keep_plants=True)
     assert len(_plants()) == 8
     assert not any(o.tetflora.population for o in _plants())
+
+
+def test_fields_are_told_by_the_name_that_the_list_shows(capfd):
+    """They are renamed there, which names the object."""
+    obj = add_mesh("Field")
+    obj.tetflora.is_field = True
+    plant_objects.note_field(bpy.context.scene, obj)
+    obj.name = "Edge of the wood"
+    with pytest.raises(RuntimeError, match="Edge of the wood"):
+        _ops().update_layers(which='ACTIVE')
+    _ops().remove_layer()
+    assert '"Edge of the wood" removed' in capfd.readouterr().out
 
 
 def test_what_is_kind_of_storage_changes_with_the_setting():

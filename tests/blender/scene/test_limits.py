@@ -148,6 +148,15 @@ def test_an_orthographic_scale_of_nothing_is_said(scene):
     refine.refine(scene, depsgraph())
 
 
+@pytest.mark.parametrize(("mark", "label"), [("is_occluder", "Occluder"), ("is_explicit", "Refine This Mesh")])
+def test_a_mesh_without_faces_is_told_where_its_mark_is_turned_off(scene, mark, label):
+    odd = bpy.data.objects.new("odd", bpy.data.meshes.new("odd"))
+    scene.collection.objects.link(odd)
+    setattr(odd.tetflora, mark, True)
+    with pytest.raises(errors.SceneError, match=f'"odd" .*turn off {label} in Properties > Object$'):
+        refine.refine(scene, depsgraph())
+
+
 @pytest.mark.parametrize("kind", ["EMPTY", "CAMERA", "LIGHT", "ARMATURE", "SPEAKER"])
 def test_a_field_that_can_have_no_points_is_named(scene, kind):
     data = {
@@ -169,7 +178,7 @@ def test_a_field_that_can_have_no_points_is_named(scene, kind):
         lambda: run_to_end(populations.make_plants_steps(scene, depsgraph(), population)),
         lambda: brush.Standing(scene, depsgraph(), covers=True),
     ):
-        with pytest.raises(errors.SceneError, match=r'"odd" is no mesh or point cloud .*turn off Field of Plants'):
+        with pytest.raises(errors.SceneError, match=r'"odd" is no mesh .*Stop Using as Field in Properties > Object$'):
             do()
     select(odd)
     assert bpy.ops.tetflora.mark(what='FIELD') == {'FINISHED'}  # off again

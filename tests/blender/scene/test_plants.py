@@ -227,7 +227,7 @@ def _excluded(plants):
         (lambda: None, "No plants to render.*Add > TetFlora Plant"),
         (lambda: setattr(add_plant(), "hide_render", True), "to render; 1 are hidden in renders"),
         (lambda: _excluded([add_plant(f"x{i}") for i in range(3)]), "3 are hidden.*excluded from the view layer"),
-        (lambda: setattr(add_plant().tetflora, "enabled", False), "are disabled"),
+        (lambda: setattr(add_plant().tetflora, "enabled", False), "are disabled; enable some in Properties > Object"),
         (lambda: add_plant("Old oak", "quercus"), '"Old oak": unknown species "quercus".*quercus.json'),
         (lambda: add_plant("Old oak", ""), '"Old oak": unknown species ""'),
         (lambda: add_plant("Flat", scale=(1.0, 1.0, 0.0)), '"Flat": zero scale'),

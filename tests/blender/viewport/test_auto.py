@@ -196,6 +196,15 @@ def test_switched_off_it_keeps_what_is_there_and_stops(scene, monkeypatch):
     assert len(results(scene)) == 1
 
 
+def test_where_no_plant_is_left_the_line_says_no_more_than_fits(scene, monkeypatch):
+    """What to do was behind it: Blender cut the middle of both."""
+    for plant in [o for o in scene.objects if o.tetflora.is_plant]:
+        bpy.data.objects.remove(plant)
+    scene.tetflora.auto_refine = True
+    settle(monkeypatch)
+    assert auto.message() == "No plants to render"
+
+
 def test_what_cannot_be_refined_is_said(scene, monkeypatch):
     bpy.data.objects["tree 0"].tetflora.species = "quercus"
     scene.tetflora.auto_refine = True
@@ -239,7 +248,28 @@ def test_a_plant_hidden_while_it_works_is_heard_afterwards(scene, monkeypatch):
     bpy.data.objects["tree 1"].hide_render = True
     bpy.context.view_layer.update()
     settle(monkeypatch)
+    assert auto.changed_since(scene) == ["the plants"]  # as in the window, a moment after any change
+    assert settle(monkeypatch) > 0
     assert json.loads(scene.tetflora.statistics)["plants"] == 2
+
+
+@pytest.mark.parametrize("hides", [True, False])
+def test_a_plant_that_is_hidden_by_its_eye_is_refined_anew_once(scene, monkeypatch, hides):
+    tree = bpy.data.objects["tree 1"]
+    tree.hide_set(not hides)
+    scene.tetflora.auto_refine = True
+    changed(scene)
+    settle(monkeypatch)
+    bpy.context.view_layer.update()
+    auto._state.scene = 0  # nothing is left to do
+    tree.hide_set(hides)  # as H does, of which Blender tells nobody
+    bpy.context.view_layer.update()
+    assert auto.changed_since(scene) == ["the plants"]  # as in the window, a moment after any change
+    assert settle(monkeypatch) > 0
+    assert any(o.hide_viewport for c in results(scene) for o in c.objects) == hides
+    auto._state.scene = 0
+    assert auto.changed_since(scene) == []
+    assert settle(monkeypatch) == 0
 
 
 def half_make(scene, monkeypatch):

@@ -627,8 +627,7 @@ class Scatter:
             if bad:
                 raise SceneError(
                     f'"{self.owner.name}": {bad:,} of {len(keys):,} instances of "{target.name}" have an invalid '
-                    "position, rotation or scale; correct its modifiers, or turn off Refine Scatter in the TetFlora "
-                    "tab of the sidebar"
+                    "position, rotation or scale; fix its modifiers or turn off Refine Scatter in Properties > Object"
                 )
             whole = _sizeable(matrices)
             if not whole.all():

@@ -172,8 +172,7 @@ def terrain_steps(order: Import, most: int, image: Path | None = None) -> Steps:
     order.remember(place)
     step = float(np.linalg.norm(points[faces[:, 0], :2] - points[faces[:, 1], :2], axis=1).mean())
     finer = "; the file is finer, see Max Faces" * (coarse is not raster)
-    ground = f'Ground "{obj.name}" of {len(faces):,} faces, one every {step:.2f} m{finer}'
-    return Imported(obj, [ground, *notes])
+    return Imported(obj, [f'Ground "{obj.name}" of {len(faces):,} faces, one every {step:.2f} m{finer}', *notes])
 
 
 def _faces(raster: Raster) -> Integers:

@@ -162,8 +162,7 @@ def _in_leaf(scene: Scene, kind: str) -> float:
         return 1.0
     if year is None or year.leaf is None:
         return 1.0
-    leaf = year.at_latitude(abs(season.latitude)).leaf
-    return float(expected_of(leaf, np.array([season.northern_day]), PRESENT)[0])
+    return float(expected_of(year.at_latitude(abs(season.latitude)).leaf, np.array([season.northern_day]), PRESENT)[0])
 
 
 def _even_sample(number: int, most: int = _LOOKED_AT) -> Integers:

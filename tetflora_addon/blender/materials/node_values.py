@@ -156,8 +156,7 @@ def to_hsv(color: Values) -> Values:
     span = most - least
     r, g, b = _ratio(most - color, np.broadcast_to(span, color.shape))
     hue = np.where(color[0] == most, b - g, np.where(color[1] == most, 2 + r - b, 4 + g - r)) / 6
-    hue = np.where(span > 0, hue - np.floor(hue), 0)
-    return np.stack([hue, _ratio(span, most), most])
+    return np.stack([np.where(span > 0, hue - np.floor(hue), 0), _ratio(span, most), most])
 
 
 def from_hsv(color: Values) -> Values:
@@ -268,8 +267,7 @@ class NodeValues:
         return Scattered(np.clip(a.cover + b.cover - 1, 0, 1), a.color + b.color, a.through + b.through)
 
     def _tint(self, node: Node, key: str, stack: Stack) -> Values:
-        missing = self._points.viewport.reshape(3, 1, 1)
-        return np.clip(self._or_told(self.color, node, key, stack, missing), 0, 1)
+        return np.clip(self._or_told(self.color, node, key, stack, self._points.viewport.reshape(3, 1, 1)), 0, 1)
 
     def _part(self, node: Node, key: str, stack: Stack) -> Values:
         missing = np.full((1, 1), {"Alpha": 1.0, "Strength": 1.0, "Fac": 0.5}.get(key, 0.0), np.float32)
@@ -465,8 +463,7 @@ class NodeValues:
             mapping, lambda x: [mapping.evaluate(c, mapping.evaluate(curves[3], x)) for c in curves[:3]]
         )
         color, factor = self.color(node, "Color", stack), self.number(node, "Fac", stack)
-        curved = np.stack([_looked_up(table[:, i : i + 1], color[i])[0] for i in range(3)])
-        return color + factor * (curved - color)
+        return color + factor * (np.stack([_looked_up(table[:, i : i + 1], color[i])[0] for i in range(3)]) - color)
 
     def _table(self, of: ColorRamp | CurveMapping, value: Callable[[float], Sequence[float]]) -> Floats32:
         key = repr(settings_of(of))  # between two steps a node may change, or another may have its address

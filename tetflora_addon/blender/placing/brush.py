@@ -20,6 +20,7 @@ from ..attributes import world_matrix
 from ..runtime import JobData
 from ..scene.fields import fields_of, read_field
 from ..settings import check_limits
+from ..species.edits import catalog, unknown_text
 from ..worker import run_to_end
 from . import canopy, distances, plant_objects, populations, properties, rules
 from .ground import Ground
@@ -134,6 +135,8 @@ class Stroke:
         self.changed = False  # whether a flush has changed the scene
         self._data = JobData("Paint Plants", scene, depsgraph)
         _, painted = _brush_of(scene)  # reports wrong settings before anything changes
+        if mode == 'PAINT' and (unknown := set(painted) - set(catalog())):
+            raise SceneError(unknown_text(min(unknown)))
         measure_all(scene, depsgraph, painted)
         # Moss neither counts for the density of trees nor keeps them away.
         self.standing = Standing(scene, depsgraph, covers=mode == 'ERASE')
@@ -225,8 +228,8 @@ class Stroke:
             standing.objects += run_to_end(plant_objects.add_plants_steps(self.scene, placement, species))
             standing.add(places, _OBJECTS, first)
             return
-        painted = (o.get(plant_objects.PAINTED_MARK) and plant_objects.editable(o) for o in standing.fields)
-        number = next((i for i, editable in enumerate(painted) if editable), None)
+        painted = (o for o in standing.fields if o.get(plant_objects.PAINTED_MARK) and o.visible_get())
+        number = next((standing.fields.index(o) for o in painted if plant_objects.editable(o)), None)
         if number is None:
             number, first = len(standing.fields), 0
             field = plant_objects.add_field(self.scene, placement, species)
@@ -248,7 +251,6 @@ def draped_circle(ground: Ground, center: Sequence[float], normal: Sequence[floa
     angle = np.linspace(0.0, 2.0 * np.pi, 49)
     x, y = center[0] + radius * np.cos(angle), center[1] + radius * np.sin(angle)
     reach = max(_REACH * radius, _LEAST_REACH)
-    z = ground.heights(np.stack([x[:-1], y[:-1]], axis=1), center[2] + reach, center[2] - reach)
-    z = np.concatenate([z, z[:1]])
+    z = ground.heights(np.stack([x, y], axis=1), center[2] + reach, center[2] - reach)
     plane = center[2] - ((x - center[0]) * normal[0] + (y - center[1]) * normal[1]) / max(abs(normal[2]), 0.2)
     return np.stack([x, y, np.where(np.isfinite(z), z, plane)], axis=1)

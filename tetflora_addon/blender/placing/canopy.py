@@ -80,8 +80,7 @@ def _shaped(crowns: Floats, form: Floats | None) -> Floats:
     radius, base, top, area = crowns.T
     higher = np.maximum(base, form[:, BASE] * top)
     left = (top - higher) / np.maximum(top - base, 1e-9)
-    leaves = area * form[:, WIDTH] * left * form[:, LEAVES]
-    return np.stack([radius * form[:, WIDTH], higher, top, leaves], axis=1)
+    return np.stack([radius * form[:, WIDTH], higher, top, area * form[:, WIDTH] * left * form[:, LEAVES]], axis=1)
 
 
 def floor_steps(canopy: Canopy, triangles: Floats, kinds: int) -> Generator[float, object, Floor]:

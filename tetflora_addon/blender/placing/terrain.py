@@ -129,8 +129,7 @@ def _from_curves(curves: Curves) -> list[tuple[Floats, bool]]:
     first = members(curves.curve_offset_data, "value", dtype=np.int32)
     attribute = curves.attributes.get("cyclic")
     cyclic = np.zeros(len(curves.curves), bool) if attribute is None else values_of(attribute)
-    parts = np.split(read(curves, "position").astype(np.float64), first[1:-1])
-    return list(zip(parts, cyclic.tolist(), strict=True))
+    return list(zip(np.split(read(curves, "position").astype(np.float64), first[1:-1]), cyclic.tolist(), strict=True))
 
 
 def read_ground(

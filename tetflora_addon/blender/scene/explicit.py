@@ -69,10 +69,8 @@ def read_explicit(depsgraph: bpy.types.Depsgraph) -> Explicit | None:
         if unseen and reader.add(obj.evaluated_get(depsgraph), world_matrix(obj, depsgraph), looks.of(obj, model=True)):
             owners.add(obj)
         else:
-            raise SceneError(
-                f'"{obj.name}" has no faces to refine; add faces, or turn off Refine This Mesh in the TetFlora '
-                "tab of the sidebar"
-            )
+            remedy = "add faces, or turn off Refine This Mesh in Properties > Object"
+            raise SceneError(f'"{obj.name}" has no faces to refine; {remedy}')
     for obj in sorted(owners, key=lambda o: o.name_full):
         if obj.library is not None:
             raise SceneError(

@@ -261,7 +261,7 @@ def refuse(obj: Object, bad: Mask, what: str) -> None:
     if bad.any():
         raise SceneError(
             f'"{obj.name}": {int(bad.sum()):,} of {len(bad):,} points have {what}; the first is point '
-            f"{int(np.argmax(bad))}. Correct or delete them, or disable the field in the TetFlora tab of the sidebar"
+            f"{int(np.argmax(bad))}. Correct or delete them, or disable the field in Properties > Object"
         )
 
 
@@ -594,8 +594,8 @@ def _read(obj: Object, depsgraph: Depsgraph, geometry: GeometrySet | None) -> tu
     held = geometry or geometry_of(obj, depsgraph)  # it owns its parts
     if held is None and obj.evaluated_get(depsgraph).is_evaluated:
         raise SceneError(
-            f'"{obj.name}" is no mesh or point cloud and cannot be a field of plants; turn off Field of Plants in the '
-            "TetFlora tab of the sidebar"
+            f'"{obj.name}" is no mesh or point cloud and cannot be a field of plants; click Stop Using as Field in '
+            "Properties > Object"
         )
     parts = parts_of(obj, depsgraph, held)
     points, sizes, records = read_points(obj, field_kinds(obj), parts), read_sizes(obj, parts), read_records(obj, parts)

@@ -126,9 +126,7 @@ def name_keys(objects: Sequence[bpy.types.Object]) -> Keys:
 SURFACE_TYPES = {'MESH', 'CURVE', 'SURFACE', 'FONT', 'META', 'CURVES'}
 #: Instances within instances that are followed, as many as Blender draws.
 DEEPEST = 8
-_OCCLUDER_REMEDY = (
-    "an occluder must be a mesh with faces. Add faces, or turn off Occluder in the TetFlora tab of the sidebar"
-)
+_OCCLUDER_REMEDY = "an occluder must be a mesh with faces. Add faces, or turn off Occluder in Properties > Object"
 
 
 def view_layer_groups(scene: bpy.types.Scene) -> list[list[bpy.types.ViewLayer]]:

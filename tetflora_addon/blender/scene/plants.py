@@ -127,7 +127,7 @@ class _Found:
             return SceneError(_unknown(self.odd))
         every = (*self.owners, *(c.owner for c in self.copies))
         if every and not any(o.tetflora.enabled for o in every):
-            return NoPlantsError("All plants in the scene are disabled; enable some in the TetFlora tab of the sidebar")
+            return NoPlantsError("All plants in the scene are disabled; enable some in Properties > Object")
         if fields := [o.name for o in self.owners if o.tetflora.is_field]:
             return NoPlantsError(
                 f"{listed(fields)}: the field of plants has no points; add vertices, or populate a mesh"

@@ -12,7 +12,7 @@ simple shapes stand for them until there is a first look; else they stay until a
 """
 
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Generator, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from hashlib import blake2b
@@ -65,7 +65,6 @@ class _State:
     due: float = 0.0
     message: str = ""
     working: bool = False  # in here right now: what changes is our own doing
-    again: bool = False  # look once more when the job is done
     paused: int = 0  # others that refine
     view: tuple[int, str] = (0, "")  # a scene, and that of the viewport when it was looked at last
     camera: Camera | None = None  # of the job
@@ -161,8 +160,7 @@ def _still_good(scene: bpy.types.Scene, now: Camera | None) -> bool:
 
 def _away(scene: bpy.types.Scene) -> float:
     """Meters to what a viewport turns around."""
-    viewport = viewport_of(scene)
-    return viewport[0].region_3d.view_distance if viewport else 1.0
+    return viewport[0].region_3d.view_distance if (viewport := viewport_of(scene)) else 1.0
 
 
 def schedule(scene: bpy.types.Scene, by_view: bool = False) -> None:
@@ -230,7 +228,8 @@ def tick() -> float | None:
     except Exception as error:
         expected = isinstance(error, TetFloraError)
         _state.steps, more = None, False
-        _state.message = str(error) if expected else f"unexpected error, please report it as a bug: {error!r}"
+        said = str(error).partition("; ")[0]  # the panel has a line
+        _state.message = said if expected else f"unexpected error, please report it as a bug: {error!r}"
         redraw()
         if not expected:
             raise
@@ -246,16 +245,15 @@ def _begin(scene: bpy.types.Scene) -> bool:
     camera = view_camera(scene) if _follows_viewport(scene) else None
     digest = scene_digest(scene, layer.depsgraph, camera)
     if _done.get(scene.session_uid) == digest and has_results(scene):
+        note_results(scene, results_made_for(scene))
         _sharp.add(scene.session_uid)
         _state.message = ""
         redraw()
         return False
-    _state.digest, _state.again = digest, False
-    _state.made_for, _state.pace = results_made_for(scene), Pace(SLICE, SLICE)
+    _state.digest, _state.made_for, _state.pace = digest, results_made_for(scene), Pace(SLICE, SLICE)
     seen = scene.session_uid in _sharp and has_results(scene)
     coarse = not (seen and alike(_seen.get(scene.session_uid), camera, _away(scene)))
-    _state.steps = refine.refine_steps(scene, layer.depsgraph, camera=camera, first_look=coarse)
-    _state.camera = camera
+    _state.camera, _state.steps = camera, refine.refine_steps(scene, layer.depsgraph, camera=camera, first_look=coarse)
     if coarse:
         _seen[scene.session_uid] = camera
         _sharp.discard(scene.session_uid)
@@ -275,8 +273,7 @@ def _slice(scene: bpy.types.Scene) -> bool:
         note_results(scene, _state.made_for)
         prepare_scene(scene)
         redraw()
-        _state.due = time.monotonic() + QUIET
-        return _state.again
+        return False
     text = f"{progress.fraction:.0%}  {progress.message}"
     if text != _state.message and _state.pace.tells():
         _state.message = text
@@ -289,7 +286,15 @@ def _view_layer(scene: bpy.types.Scene) -> bpy.types.ViewLayer:
     return shown or scene.view_layers[0]
 
 
-_outlook = Outlook(lambda scene, layer: stored_contents_steps(scene, layer) if has_results(scene) else None)
+def _contents_steps(scene: bpy.types.Scene, layer: bpy.types.ViewLayer) -> Generator[None, None, dict[str, str]]:
+    """What takes part, where there are results; refined where theirs was another: of H, nothing else tells."""
+    now = (yield from stored_contents_steps(scene, layer)) if has_results(scene) else {}
+    if scene.tetflora.auto_refine and _state.steps is None and changed_since(scene, now):
+        schedule(scene)
+    return now
+
+
+_outlook = Outlook(_contents_steps)
 
 
 def results_made_for(scene: bpy.types.Scene, ask: Callable = stored_contents) -> dict[str, str]:
@@ -314,10 +319,10 @@ def note_results(scene: bpy.types.Scene, made_for: dict[str, str]) -> None:
         collection[_MADE_FOR] = made_for
 
 
-def changed_since(scene: bpy.types.Scene) -> list[str]:
+def changed_since(scene: bpy.types.Scene, now: Mapping[str, str] | None = None) -> list[str]:
     """What has changed since the results of a scene were made; nothing where these do not say for what."""
     before = next((c[_MADE_FOR].to_dict() for c in result_collections(scene, 'VIEW') if _MADE_FOR in c), {})
-    now = results_made_for(scene, _outlook.of) if before else {}
+    now = results_made_for(scene, _outlook.of) if before and now is None else now or {}
     return [name for name, text in now.items() if before.get(name, text) != text]
 
 
@@ -333,17 +338,12 @@ def on_change(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
     _known[scene.session_uid] = settings
     changed = [one for one in depsgraph.updates if isinstance(one.id.original, _CHANGING)]
     concerns = [one for one in changed if not is_ours(one.id.original)]
-    at_it = _state.steps is not None and scene.session_uid == _state.scene
     # Objects that have neither moved nor another form nor other settings may have been hidden.
-    flags = (
-        isinstance(one.id.original, bpy.types.Object) and not (one.is_updated_transform or one.is_updated_geometry)
-        for one in concerns
-    )
-    if at_it and not other and all(flags):
-        # Results that are linked have the flags of all other objects updated, and that when we are no longer at work:
-        # the job would stop itself for ever. Whoever hid an object meanwhile is heard when it is done.
-        _state.again = _state.again or bool(concerns)
-    elif other or concerns:
+    formed = [one for one in concerns if one.is_updated_transform or one.is_updated_geometry]
+    flags = not formed and all(isinstance(one.id.original, bpy.types.Object) for one in concerns)
+    # Results that are linked have the flags of all other objects updated, and that when we are no longer at work: the
+    # job would stop itself for ever. Whoever hid an object meanwhile is seen when it is done.
+    if other or (concerns and not (flags and _state.steps is not None and scene.session_uid == _state.scene)):
         schedule(scene)
 
 
@@ -351,8 +351,7 @@ def on_frame(scene: bpy.types.Scene, _depsgraph: object = None) -> None:
     """Another frame: in the wind all plants have moved, and it may be another day or year."""
     if _state.working or not scene.tetflora.auto_refine:
         return
-    moves = wind_of(scene) is not None or season_of(scene) is not None or years_of(scene) > 0.0
-    if moves or stand_years(scene):
+    if wind_of(scene) is not None or season_of(scene) is not None or years_of(scene) > 0.0 or stand_years(scene):
         schedule(scene)
 
 

@@ -197,8 +197,7 @@ def view_camera(region: bpy.types.RegionView3D, near: float, origin: Floats) -> 
     kind = "PERSP" if region.is_perspective else "ORTHO"
     # From an orthographic view everything is in front: its eye is as far back as one likes.
     near = near if kind == "PERSP" else -np.inf
-    whole = Camera(kind, matrix[:3, 3], matrix[:3, :3], (-1.0, 1.0, -1.0, 1.0), near, np.inf, 1, 1)
-    return whole.counted_from(origin)
+    return Camera(kind, matrix[:3, 3], matrix[:3, :3], (-1.0, 1.0, -1.0, 1.0), near, np.inf, 1, 1).counted_from(origin)
 
 
 def _kept(preview: Preview, name: str, key: tuple, make: Callable[[], object]) -> object:
