@@ -41,12 +41,13 @@ SEEDS = {
     "beech": 3.0,
     "hazel": 1.0,
 }
-#: Sides of the stand and of the land, and how high the land rolls, meters.
-_SIDE, _LAND, _ROLL = 100.0, 260.0, 1.4
+#: Sides of the stand and of the land, how high the land rolls, and rises behind, and from where on, meters.
+_SIDE, _LAND, _ROLL, _RISE, _BEHIND = 100.0, 260.0, 1.4, 12.0, 20.0
 #: Stand and land reach beyond both sides of the picture.
 _EYE, _AHEAD, _LENS = (-34.0, -95.0, 3.0), (4.0, 0.0, 13.0), 30.0
 _FIGURE = (-27.0, -68.0)
-_SUN = (27.0, 292.0)
+#: Where the sun stands, degrees: above the horizon, and from north to the east. It lights the edge from the left.
+_SUN = (30.0, 238.0)
 #: Fraction below which space counts as hidden: between trunks one sees far.
 _HIDDEN = 0.001
 
@@ -79,8 +80,9 @@ def build(scene: bpy.types.Scene, years: int = max(YEARS)) -> bpy.types.Object:
 
 
 def _height(x: NDArray[np.float64], y: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Of the land, meters."""
-    return _ROLL * (np.sin(0.045 * x + 0.6) * np.cos(0.038 * y) + 0.3 * np.sin(0.11 * (x - y)))
+    """Of the land, meters; it rises behind, so that grass instead of the sky is between trunks."""
+    rolling = np.sin(0.045 * x + 0.6) * np.cos(0.038 * y) + 0.3 * np.sin(0.11 * (x - y))
+    return _ROLL * rolling + _RISE * np.clip((y - _BEHIND) / (0.5 * _LAND - _BEHIND), 0.0, 1.0) ** 2
 
 
 def render_grown(path: Path, size: tuple[int, int] = SIZE, samples: int = SAMPLES) -> None:
