@@ -331,8 +331,7 @@ class GrownPlants(FrontierKind):
         """As of `FrontierKind`."""
         bound = extents(self.flora, parts.branches, farthest=False)
         silhouette = 2.0 * bound[:, 0] * (bound[:, 2] - bound[:, 1]) * parts.branches.length**2
-        whole = parts.branch_only | ~parts.can_open(self.flora)
-        return np.where(whole, 1.0, opaque_fractions(silhouette, parts.totals.optical_area))
+        return np.where(parts.can_open(self.flora), opaque_fractions(silhouette, parts.totals.optical_area), 1.0)
 
     def can_open(self, parts: PlantParts) -> Mask:
         """As of `FrontierKind`."""

@@ -38,6 +38,19 @@ def test_tubes_are_solid_and_as_wide_as_they_are(radius: float, length: float, s
     np.testing.assert_allclose(one.width, 2 * radius, rtol=0.1)
 
 
+def test_a_face_of_no_area_bends_nothing() -> None:
+    """A triangle between two rings whose corners are on one line, as boolean operations leave them."""
+    positions, faces = tube(0.125, 2.375, 4)
+    positions = np.rint(8.0 * positions) / 8.0  # so that its area is 0 to the last bit
+    before = surface(positions, faces).width
+    first, second, *others = faces[40]
+    middle = len(positions)
+    changed = [*faces[:40], [first, middle, second, *others], *faces[41:], [second, middle, first]]
+    after = surface(np.concatenate([positions, positions[[first, second]].mean(axis=0, keepdims=True)]), changed)
+    assert after.solid.all()
+    np.testing.assert_allclose(after.width[:-1], before, rtol=0.1)
+
+
 def test_cards_are_leaves_and_ground_and_walls_are_neither_leaf_nor_solid() -> None:
     card = np.array([[0, 0, 0], [0.1, 0, 0], [0.1, 0.2, 0], [0, 0.2, 0]], float)
     many = np.concatenate([card + [i, 0, 0] for i in range(100)])

@@ -544,6 +544,22 @@ def test_every_part_is_decided_once() -> None:
     assert area == pytest.approx(whole, rel=0.05)  # plants differ in leaves
 
 
+def test_where_nobody_looks_dense_shoots_keep_what_is_opaque_and_twigs_all() -> None:
+    """Needles behind needles cast no shadow of their own; a part that cannot be opened stands for itself alone."""
+    flora, camera = support.alone("spruce", BIRCH), wood()[2]
+    result = replace(run(flora, support.grove(2, 8.0), camera)[1], lights=(SUN,))
+    given = support.refined(flora, result, camera, 1.2, 0.6).drawing
+    (kind,), (parts,), least, twigs = given.kinds, given.parts, 1.0, 0
+    while len(parts):
+        large, part = kind.can_open(parts), kind.enough(parts)
+        assert np.all(part[~large] == 1.0)
+        assert np.all((part > 0.0) & (part <= 1.0))
+        least, twigs = min(least, part.min()), twigs + np.count_nonzero(~large & ~parts.branch_only)
+        parts = kind.opened(parts.take(np.flatnonzero(large)[:200]))[0]
+    assert least < 0.5
+    assert twigs > 100
+
+
 def test_each_part_is_decided_with_the_depth_of_its_own_cell(monkeypatch: pytest.MonkeyPatch) -> None:
     """However many slabs others have waited for."""
     flora, _, camera, result = wood()

@@ -76,6 +76,9 @@ def test_gltf_has_all_places_and_levels(forest, tmp_path):
     np.testing.assert_allclose(place, np.column_stack([world[:, 0], world[:, 2], -world[:, 1]]), rtol=1e-6)
     quarters = values(read, given["_SEED"]).astype(np.int64)
     np.testing.assert_array_equal((quarters << (16 * np.arange(4))).sum(axis=1), part.seed)
+    np.testing.assert_array_equal(values(read, given["SCALE"]), np.full((NUMBER, 3), 2.0))
+    for name, value in (("_SPECIES", 0.0), ("_AGE", 3.0), ("_HEIGHT", 4.0)):
+        np.testing.assert_array_equal(values(read, given[name]), np.full((NUMBER, 1), value))
     # A rotation about an axis that is turned like all points is the same rotation.
     swap = np.array([[1, 0, 0], [0, 0, 1], [0, -1, 0]])
     for (x, y, z, w), (a, b, c, d) in zip(values(read, given["ROTATION"]), part.rotation, strict=True):

@@ -68,6 +68,17 @@ def test_links_keep_within_the_tolerance(blade: Blade, tolerance: float) -> None
         assert distance_to_links(curve, ends[link], ends[link + 1]).max() < tolerance
 
 
+@pytest.mark.parametrize("lobes", [5, 7, 9])
+def test_palmate_margins_are_smooth_between_their_knots(lobes: int) -> None:
+    """Tips and sinuses are knots: between them the distance from the base has no corner and no sinus."""
+    blade = Blade(width=1.0, lobing="palmate", lobes=lobes, lobe_depth=0.6, lobe_round=0.0)
+    s = np.linspace(0.06, 1.0, 20_001)
+    reach = np.linalg.norm(blade.margin(s, 1), axis=1)
+    turns = s[1:-1][np.diff(np.sign(np.diff(reach))) != 0]  # lobes and sinuses in turn
+    assert len(turns) >= lobes - 2
+    assert np.abs(turns[:, None] - blade.knots(1)).min(axis=1).max() < 1e-3
+
+
 @given(blades)
 @settings(deadline=None, max_examples=30)
 def test_rays_lead_outwards(blade: Blade) -> None:

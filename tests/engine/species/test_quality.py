@@ -128,6 +128,20 @@ def test_plants_keep_their_height_and_width(name: str, quality: float) -> None:
     assert extents(name, quality) == pytest.approx(extents(name, 0.5), rel=0.12)
 
 
+def limb_bark(species: Species) -> float:
+    """Area of the tubes of all limbs, over the trunk's length and their taper: number, length, and perimeter."""
+    trunk, limb, *_ = species.orders
+    perimeter = 2.0 * limb.sides * math.sin(math.pi / limb.sides) * trunk.thickness.mean * limb.thickness.mean
+    return expected_members(species).branches[1] * limb.length.mean * perimeter
+
+
+@pytest.mark.parametrize("quality", [0.1, 0.4, 3.0])
+@pytest.mark.parametrize("name", ["conifer", "spruce", "palm", "aspen"])
+def test_fewer_and_shorter_limbs_show_as_much_bark(name: str, quality: float) -> None:
+    """They are thicker; of fewer sides as well."""
+    assert limb_bark(with_quality(kind(name), quality)) == pytest.approx(limb_bark(kind(name)), rel=0.005)
+
+
 def test_bent_branches_end_where_they_did() -> None:
     """A trunk of other segments leans aside as far: by its curvature on the mean, and by chance as much."""
     data = support.small(order0={"curvature": [50, 0], "curvature_tip": 80, "angle": [0, 0], "segments": 8})
