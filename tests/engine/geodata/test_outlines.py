@@ -106,7 +106,12 @@ def test_holes_are_outside_of_the_one_ring():
     holes = [np.array([[1.0, 1.0], [3.0, 1.0], [3.0, 3.0], [1.0, 3.0]]), np.array([[6.0, 6.0], [8.0, 6.0], [7.0, 9.0]])]
     points = np.random.default_rng(0).uniform(-1.0, 11.0, (4000, 2))
     expected = inside_any(points, [outer]) & ~inside_any(points, holes)
-    assert (inside_any(points, [one_ring((outer, *holes))]) == expected).all()
+    ring = one_ring((outer, *holes))
+    assert (inside_any(points, [ring]) == expected).all()
+    # Bridges are the shortest from where a hole is farthest east, there and back.
+    lengths = [np.linalg.norm(np.diff(one, axis=0, append=one[:1]), axis=1).sum() for one in (ring, outer, *holes)]
+    bridges = [np.linalg.norm(outer - hole[hole[:, 0].argmax()], axis=1).min() for hole in holes]
+    assert lengths[0] == pytest.approx(sum(lengths[1:]) + 2.0 * sum(bridges))
 
 
 @pytest.mark.parametrize("closed", [False, True])

@@ -147,6 +147,16 @@ def test_farther_north_leaves_come_later_and_go_earlier(name: str) -> None:
     assert (np.diff(area, axis=0) < 0).all()
 
 
+@pytest.mark.parametrize("name", DECIDUOUS)
+def test_far_in_the_south_the_first_and_the_last_leaves_stay_apart(name: str) -> None:
+    """By 2.8 standard deviations of all three dates, as far as their own year is not longer."""
+    leaf = load_species(name).year.leaf
+    moved = load_species(name).year.at_latitude(0.0).leaf
+    longest = DAYS - 2.8 * (leaf.appear_spread + leaf.turn_spread + leaf.fall_spread)
+    assert moved.fall - moved.appear <= max(longest, leaf.fall - leaf.appear) + 1e-9
+    assert moved.appear < moved.turn <= moved.fall
+
+
 @pytest.mark.parametrize("course", COURSES, ids=lambda course: course["species"])
 def test_leaf_area_through_the_year_is_the_published_one(course: dict[str, Any]) -> None:
     assert np.abs(leaf_area.errors(course)).max() <= 0.1

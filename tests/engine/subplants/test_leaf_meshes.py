@@ -156,6 +156,19 @@ def test_uv_of_leaves_and_bark() -> None:
     assert quads[..., 0].max() == 1
 
 
+def test_bark_begins_at_the_ground_but_on_stems_beyond_a_fork() -> None:
+    """Where materials have moss: v counts girths from the foot, and from 4 m up where a trunk goes on as stems."""
+    flora = support.compiled(support.small(order0={"forks": [2, 0], "fork_at": 0.5}))
+    _, pieces = support.grown(flora, support.plants(1))
+    stems = flora.rows["continues"][pieces.branches.row]
+    assert 0 < stems.sum() < len(stems)
+    for chosen, meters in ((~stems, 0.0), (stems, 4.0)):
+        for branch in np.flatnonzero(chosen)[:8]:
+            v = support.tube_mesh(flora, pieces.take(pieces.branches.key == pieces.branches.key[branch]))
+            lowest = v.attributes["UVMap"][1][:, 1].min()
+            assert lowest * 2.0 * np.pi * pieces.branches.radius[branch] == pytest.approx(meters, abs=1e-3)
+
+
 def test_one_color_a_branch_and_a_leaf() -> None:
     flora = support.small_flora()
     _, pieces = support.grown(flora, support.plants(1))
