@@ -66,7 +66,8 @@ def bilinear(values: NDArray[np.floating], place: NDArray[np.floating]) -> Float
     (x, y), (right, above) = low.T, np.minimum(low + 1, (columns - 1, rows - 1)).T
     part, rise = (place - low).T
     bottom = values[y, x] * (1.0 - part) + values[y, right] * part
-    return bottom * (1.0 - rise) + (values[above, x] * (1.0 - part) + values[above, right] * part) * rise
+    top = values[above, x] * (1.0 - part) + values[above, right] * part
+    return bottom * (1.0 - rise) + top * rise
 
 
 def smoothstep(x: Floats, low: float = 0.0, high: float = 1.0) -> Floats:

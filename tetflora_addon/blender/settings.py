@@ -111,7 +111,7 @@ def with_identity(groups: Iterable[bpy.types.PropertyGroup], uid: str) -> bpy.ty
 
 def rules_of(layer: bpy.types.PropertyGroup) -> bpy.types.PropertyGroup:
     """Where the settings of what grows in a layer are: in itself, or in the stand that it shows."""
-    return layer.field.tetflora.stand if layer.kind == FIELD and layer.field is not None else layer
+    return layer if named(layer) is layer else layer.field.tetflora.stand
 
 
 def named(layer: bpy.types.PropertyGroup) -> bpy.types.PropertyGroup | bpy.types.Object:

@@ -516,7 +516,8 @@ class DayTotals:
         count = self.count[subplants.row]
         every, left = count.sum(axis=1), self._summed(subplants, count, seasons.PRESENT)
         size = self._summed(subplants, count, seasons.SIZE) / np.maximum(left, 1e-300)
-        return np.where(every > 0, bare + (left / np.maximum(every, 1e-300)) * (leaf * size - bare), leaf)
+        share = left / np.maximum(every, 1e-300)
+        return np.where(every > 0, bare + share * (leaf * size - bare), leaf)
 
     def share_range(self, rows: Table, species: int) -> tuple[float, float]:
         """Least and greatest `leaf_share` of plants of a species on the day of rows (r,)."""

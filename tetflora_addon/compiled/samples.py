@@ -77,7 +77,7 @@ class Samples:
 def draw_samples(
     rows: Table, leaf_area: Floats, wood_area: Floats, length: Floats, sampled: Container[int], *times: int
 ) -> list[Samples]:
-    """Sample rows, once for each of several numbers.
+    """Sample rows; one `Samples` for each of several numbers.
 
     Parameters
     ----------
@@ -88,8 +88,8 @@ def draw_samples(
         Typical length of a branch, meters.
     sampled : container of int
         Which rows.
-    times : ints
-        So many times as many as proxies need.
+    *times : int
+        So many times as many as proxies need, each once.
     """
     drawn = {number: ([], []) for number in times}
     trunk = np.flatnonzero(np.diff(rows["species"], prepend=-1))

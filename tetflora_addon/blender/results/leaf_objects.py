@@ -108,7 +108,8 @@ def _filled(model: LeafModel) -> float:
     area = abs(np.add.reduceat(u * v[model.next_corner] - v * u[model.next_corner], model.face_offsets[:-1])).sum() / 2
     ends = (model.uv @ np.stack([np.cos(_DIRECTIONS), np.sin(_DIRECTIONS)])).argmax(axis=0)
     x, y = u[ends], v[ends]
-    return float(area / max(abs((x * np.roll(y, -1) - y * np.roll(x, -1)).sum()) / 2, 1e-12))
+    hull = abs((x * np.roll(y, -1) - y * np.roll(x, -1)).sum()) / 2
+    return float(area / max(hull, 1e-12))
 
 
 def _length(species: Species, kind: str) -> float:
